@@ -77,8 +77,14 @@ function sentence({ minutes, range_v, probability, decides }) {
   return `${schedule} decide between ${decides.map(causes).join("; ")} with a predicted probability of ${digits(probability, 3)}.`;
 }
 
-function answer({ separations, intervals }) {
+function answer({ suspects, separations, intervals }) {
   const parts = [];
+  if (suspects.length) {
+    const rows = suspects.map(({ cause, nats, probability, rival }) => [
+      { text: cause, class: "cause" }, `1 to ${digits(Math.exp(-nats))}`, digits(probability, 3), { text: causes(rival), class: "cause" },
+    ]);
+    parts.push(table(["suspect", "odds today", "confirmed if true", "hardest to reject"], rows, "What the experiment shows of the suspects"));
+  }
   if (separations.length) {
     const rows = separations.map(({ truth, rival, nats, probability }) => [
       { text: causes(truth), class: "cause" }, { text: causes(rival), class: "cause" }, digits(nats), digits(probability, 3),

@@ -237,6 +237,17 @@ class Equation:
 
 
 @dataclass(frozen=True)
+class Suspected:
+    """A suspect of a diagnosis, with the logarithm of its odds in nats, and what an experiment is predicted to show of it."""
+
+    cause: str
+    causes: List[str]
+    nats: float
+    probability: float
+    rival: List[str]
+
+
+@dataclass(frozen=True)
 class Separation:
     """A true set of causes compared with a rival."""
 
@@ -416,6 +427,7 @@ class Plan(Answer):
     probability: Optional[float]
     minutes: float
     range_v: List[float]
+    suspects: List[Suspected]
     separations: List[Separation]
     parts: List[Part]
     intervals: List[Sharper]

@@ -71,6 +71,61 @@ fn planned_experiment_decides_between_hysteresis_and_a_static_law() {
     }
 }
 
+/// The report's own stair: nothing explains its 17 readings.
+#[test]
+fn suspects_of_the_reports_stair_are_decided_by_the_planned_experiment() {
+    let folder = tempdir().unwrap();
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/table3_stair.csv");
+    let report = json(folder.path(), &["diagnose", data, "--column", "measured", "--input", "stair", "--json"]);
+    assert_eq!(report["verdict"], "unexplained", "{report}");
+    assert!(report["next_experiment"].as_str().unwrap().contains("`vsj plan DIAGNOSIS.json`"), "{report}");
+    fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
+    let plan = json(folder.path(), &["plan", "first.json", "--out", "next", "--json"]);
+    let short = |cause: &str| {
+        let suspect = report["suspects"].as_array().unwrap().iter().find(|it| it["cause"] == cause);
+        suspect.expect("a suspect")["nats_short"].as_f64().unwrap()
+    };
+    for cause in [Cause::StaticNonlinearity, Cause::VoltageDependentTimeConstant] {
+        let suspect = plan["suspects"].as_array().unwrap().iter().find(|it| it["cause"] == cause.name());
+        let suspect = suspect.unwrap_or_else(|| panic!("{cause}: {plan}"));
+        let nats = suspect["nats"].as_f64().unwrap();
+        assert!((nats + short(cause.name())).abs() < 1e-9 && nats < 0.0, "{suspect}");
+        assert!((0.0..=1.0).contains(&suspect["probability"].as_f64().unwrap()), "{suspect}");
+
+        let schedule = played(&folder.path().join("next/schedule.csv"));
+        let effect = Effect::draw(&mut ChaCha8Rng::seed_from_u64(21), cause, 0, &schedule, 1.0);
+        let record = LabelledRecord::new(schedule, vec![effect], Noise::white(0.2), 21);
+        fs::write(folder.path().join("next.csv"), record.csv()).unwrap();
+        let next = json(folder.path(), &["diagnose", "next.csv", "--json"]);
+        assert_eq!((next["verdict"].as_str(), causes(&next)), (Some("explained"), vec![cause.name()]), "{next}");
+    }
+    let said = text(&run(folder.path(), &["plan", "first.json"]).stdout);
+    assert!(said.contains("odds today") && said.contains("run the same schedule again"), "{said}");
+}
+
+/// An amplifier whose supply sags is a limit, and something else that no cause describes.
+#[test]
+fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
+    let folder = tempdir().unwrap();
+    let forms = validation::ground_truth::out_of_model::all();
+    let sagging = forms.iter().find(|form| form.name == "sagging supply").expect("a form");
+    fs::write(folder.path().join("first.csv"), sagging.draw(71).csv()).unwrap();
+    let report = json(folder.path(), &["diagnose", "first.csv", "--json"]);
+    assert_eq!(report["verdict"], "unexplained", "{report}");
+    fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
+    let plan = json(folder.path(), &["plan", "first.json", "--minutes", "2", "--json"]);
+    let of = |value: &Value| -> Vec<String> {
+        let suspects = value["suspects"].as_array().unwrap().iter();
+        suspects.map(|it| it["cause"].as_str().unwrap().to_owned()).collect()
+    };
+    let shown: Vec<String> = of(&report).into_iter().filter(|cause| cause != "reading-offset").collect();
+    assert!(shown.len() >= 2 && of(&plan) == shown, "{shown:?}, {plan}");
+    let decides = plan["decides"].as_array().unwrap();
+    for suspect in plan["suspects"].as_array().unwrap() {
+        assert!(decides.contains(&suspect["causes"]) && decides.contains(&suspect["rival"]), "{suspect}, {plan}");
+    }
+}
+
 #[test]
 fn schedule_keeps_limit_slew_and_time_and_is_played_by_the_stair() {
     let (folder, ..) = diagnosed(Cause::Hysteresis, 11);

@@ -57,7 +57,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let held = without_held(record);
     let record = held.as_ref().map_or(record, |(_, without)| without);
     let records = std::slice::from_ref(record);
-    let mut found = joint(records, options, None, Rivals::Reported, &mut progress)?;
+    let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
     let linear = linear(records, options);
     compare(&mut found, linear.as_ref());
     credibility::unlikely_to_suspects(&mut found.report);
@@ -73,11 +73,26 @@ pub(super) fn linear(records: &[Record], options: &Options) -> Option<BestLinear
     options.linear.clone().or_else(|| best_linear(records, options.input))
 }
 
-/// Whether the rival sets of causes are fitted and reported, for the plan of the next experiment.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Rivals {
-    Reported,
-    Omitted,
+/// A diagnosis of records in the coordinates of the search.
+pub(super) struct Normalised {
+    pub(super) found: Diagnosis,
+    normalisations: Vec<Normalisation>,
+}
+
+impl Normalised {
+    /// Returns the diagnosis in the units of its records, without the rival sets of causes.
+    pub(super) fn without_rivals(self, records: &[Record]) -> Diagnosis {
+        self.found.restored(records, &self.normalisations)
+    }
+
+    /// Returns the diagnosis in the units of its records, with the fits of the rival sets of causes for the plan of the next
+    /// experiment.
+    pub(super) fn with_rivals(self, records: &[Record], options: &Options) -> Diagnosis {
+        let (rivals, experiment) = hypotheses(&self.found, records, &options.units.reading);
+        let mut found = self.without_rivals(records);
+        (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
+        found
+    }
 }
 
 /// Finds out what the simulation gets wrong on all of several records of one spring; `only` limits the search to some causes.
@@ -88,9 +103,8 @@ pub(super) fn joint(
     records: &[Record],
     options: &Options,
     only: Option<&[&'static str]>,
-    rivals: Rivals,
     progress: &mut dyn FnMut(&str),
-) -> Result<Diagnosis> {
+) -> Result<Normalised> {
     let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let base = options.base.normalised(&normalisations[0]);
@@ -114,12 +128,7 @@ pub(super) fn joint(
     let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
     let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
     let found = of_readings(&examined, &base, progress);
-    let found = without_unsupported_terms(&examined, &base, found, progress);
-    let reported = (rivals == Rivals::Reported).then(|| hypotheses(&found, records, &options.units.reading));
-    let mut found = found.restored(records, &normalisations);
-    if let Some((rivals, experiment)) = reported {
-        (found.report.rivals, found.report.experiment) = (rivals, Some(experiment));
-    }
+    let mut found = without_unsupported_terms(&examined, &base, found, progress);
     found.report.nominal = nominal(options);
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {
@@ -128,7 +137,7 @@ pub(super) fn joint(
         allowed: budget.total(),
         finished: !budget.was_cut(),
     };
-    Ok(found)
+    Ok(Normalised { found, normalisations })
 }
 
 /// The nominal spring for the report.

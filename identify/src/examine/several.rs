@@ -16,14 +16,15 @@ use anyhow::Result;
 
 use simulation::record::Record;
 
-use crate::answer::{RecordReport, Verdict};
+use crate::answer::{RecordReport, Report, Verdict};
 use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{self, Rivals, examine, joint};
+use crate::examine::passes::{self, examine, joint};
 use crate::plant::base::Base;
 use crate::stats::median::median;
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::probability::{CLEARLY_LIKELIER, Z_ZERO};
+use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::linear_rival::compare;
@@ -44,19 +45,19 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, Rivals::Omitted, &mut |causes| {
-            progress(&format!("{}: {causes}", record[0].name))
-        })?;
-        shown.extend(alone.report.findings.iter().map(|finding| finding.cause));
+        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        shown.extend(alone.found.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
-    let mut joint = joint(records, options, Some(&shown), Rivals::Reported, &mut progress)?;
+    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
     let all: Vec<&'static str> =
         EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
-    let weak = self::joint(records, options, Some(&all), Rivals::Reported, &mut progress)?;
-    if weak.score > joint.score + CLEARLY_LIKELIER && predicts_most_records_better(&weak, &joint) {
+    let weak = self::joint(records, options, Some(&all), &mut progress)?;
+    let clearly_likelier = weak.found.score > joint.found.score + CLEARLY_LIKELIER;
+    if clearly_likelier && predicts_most_records_better(&weak.found, &joint.found) {
         joint = weak;
     }
+    let mut joint = joint.with_rivals(records, options);
     // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
     let mut spring = joint.plant.clone();
     spring.unmodelled = None;
@@ -65,9 +66,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            self::joint(&[from_zero], &options, None, Rivals::Omitted, &mut |of| {
-                progress(&format!("{}: {of}", record.name))
-            })
+            let from_zero = std::slice::from_ref(&from_zero);
+            let alone = self::joint(from_zero, &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))?;
+            anyhow::Ok(alone.without_rivals(from_zero))
         };
         let mut alone = from(offset)?;
         // A shifted stretch had a part in the zero that the joint fit found.
@@ -85,7 +86,11 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     if verdict == Verdict::Unexplained && joint.report.verdict != verdict {
         credibility::in_unexplained(&mut joint.report.findings, 0.0);
     }
-    joint.report.verdict = verdict;
+    if joint.report.verdict != verdict {
+        let Report { findings, alternatives, .. } = &joint.report;
+        joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
+        joint.report.verdict = verdict;
+    }
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }

@@ -15,6 +15,8 @@ pub struct Plan {
     pub minutes: f64,
     /// Lowest and highest voltage, in V.
     pub range_v: [f64; 2],
+    /// The suspects of a diagnosis that explains nothing, as far as a voltage shows them, in its order.
+    pub suspects: Vec<Suspected>,
     /// The experiment compared with each pair of sets.
     pub separations: Vec<Separation>,
     /// The schedule part by part.
@@ -40,6 +42,21 @@ impl Plan {
         let row = |command: &Command| format!("{},{}\n", command.time_s, command.voltage_v);
         std::iter::once("time_s,voltage_v\n".to_owned()).chain(self.commands.iter().map(row)).collect()
     }
+}
+
+/// A suspect of the diagnosis, and what the experiment is predicted to show of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Suspected {
+    /// Cause code.
+    pub cause: String,
+    /// The set of causes in which it is judged.
+    pub causes: Vec<String>,
+    /// Logarithm of its odds by the diagnosis, in nats: `-nats_short`, or `ln(p / (1 - p))` of its probability.
+    pub nats: f64,
+    /// Predicted probability that the experiment rejects all sets without it if its set is true.
+    pub probability: f64,
+    /// The set without it that is hardest to reject.
+    pub rival: Vec<String>,
 }
 
 /// A true set of causes compared with a rival.

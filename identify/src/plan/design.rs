@@ -27,7 +27,7 @@ const DRAWS: usize = 2;
 pub(super) struct Hypothesis {
     /// Cause codes, as the diagnosis names them.
     pub(super) causes: Vec<String>,
-    /// Score less that of the best set, in nats.
+    /// What the first record says for the set against the best one, in nats.
     pub(super) nats: f64,
     /// True if the diagnosis names the set; false for a set with one cause more than such a set, which is not far behind.
     pub(super) named: bool,
@@ -99,9 +99,9 @@ impl Hypothesis {
         Ok(Self { causes: rival.causes.clone(), nats: rival.nats, named, model, covariance })
     }
 
-    /// Returns true if another hypothesis predicts the same whatever the voltage is.
-    pub(super) fn same_model(&self, other: &Self) -> bool {
-        self.model == other.model
+    /// Returns true if another hypothesis differs in causes of the readings alone, so that each can always imitate the other.
+    pub(super) fn same_spring(&self, other: &Self) -> bool {
+        self.contains(other) && other.contains(self)
     }
 
     /// Returns true if the hypothesis has all causes of another one, so that it can always imitate that.

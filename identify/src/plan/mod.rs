@@ -28,6 +28,7 @@
 //! | `search` | the search for the best candidate |
 //! | `intervals` | 95 % intervals before and after an experiment |
 //! | `odds` | the probability that a schedule decides |
+//! | `suspects` | suspects of a diagnosis that explains nothing: odds today, and what an experiment shows of them |
 //! | `run` | a plan from a diagnosis |
 //! | [`answer`] | the data types of a plan |
 
@@ -43,6 +44,7 @@ mod request;
 mod run;
 mod search;
 mod separation;
+mod suspects;
 
 pub use answer::Plan;
 pub use request::{Basis, Request};

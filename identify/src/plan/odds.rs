@@ -17,10 +17,11 @@ pub(super) fn decides(nats: f64, behind: f64) -> f64 {
     0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)
 }
 
-/// Returns the weights of hypotheses from their scores, in nats behind the best: their probabilities, but none that an experiment
-/// would ignore.
+/// Returns the weights of hypotheses from what the first record says for them, in nats: their probabilities, but none that an
+/// experiment would ignore.
 pub(super) fn weights(nats: &[f64]) -> Vec<f64> {
-    let likelihood: Vec<f64> = nats.iter().map(|nats| nats.clamp(-RIVAL_ODDS, 0.0).exp()).collect();
+    let most = nats.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let likelihood: Vec<f64> = nats.iter().map(|nats| (nats - most).max(-RIVAL_ODDS).exp()).collect();
     let sum: f64 = likelihood.iter().sum();
     likelihood.into_iter().map(|likelihood| likelihood / sum).collect()
 }

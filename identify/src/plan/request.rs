@@ -23,8 +23,25 @@ pub struct Basis {
     /// The best sets of causes with their fits, the best first.
     #[serde(default)]
     pub rivals: Vec<Rival>,
+    /// Causes that come closest to a finding.
+    #[serde(default)]
+    pub suspects: Vec<Suspect>,
     /// The experiment behind the diagnosis.
     pub experiment: Option<Experiment>,
+}
+
+/// What a plan needs of a suspect; its parameters are those of the rival with its causes.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Suspect {
+    /// Cause code.
+    pub cause: String,
+    /// The other causes of the set in which it comes closest to a finding.
+    pub with: Vec<String>,
+    /// What the set's score lacks to that of the best set, in nats.
+    pub nats_short: f64,
+    /// Probability of the cause, if the best set contains it.
+    #[serde(default)]
+    pub probability: Option<f64>,
 }
 
 /// What the user allows.

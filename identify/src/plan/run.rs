@@ -19,6 +19,7 @@ use crate::plan::predictor::{Predictor, Whitening};
 use crate::plan::request::{Basis, Request};
 use crate::plan::search;
 use crate::plan::separation::{Design, Evaluation};
+use crate::plan::suspects::{UNEXPLAINED, suspected, weighed};
 use crate::plant::base::Base;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::thresholds::probability::RIVAL_ODDS;
@@ -48,7 +49,8 @@ pub fn plan(basis: &Basis, request: &Request, name: &str) -> Result<Plan> {
     if !evaluation.pairs.is_empty() && request.limit_v.is_none() {
         remarks.extend(at_limit(&design, &commands));
     }
-    Ok(finished(&design, &best, &commands, &evaluation, remarks))
+    let suspects = suspected(basis, &design, &evaluation);
+    Ok(Plan { suspects, ..finished(&design, &best, &commands, &evaluation, remarks) })
 }
 
 /// Returns what is the same for every candidate, without probes, and remarks on it.
@@ -75,13 +77,13 @@ fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> 
     let mut remarks = Vec::new();
     let undecided = |rival: &Rival| {
         rival.nats == 0.0
-            || basis.verdict == "unexplained"
+            || basis.verdict == UNEXPLAINED
             || basis.alternatives.iter().any(|set| same(set, &rival.causes))
     };
     let near = |rival: &Rival| basis.verdict == "ambiguous" && rival.nats > -TIMES_RIVAL_ODDS * RIVAL_ODDS;
-    for rival in basis.rivals.iter().filter(|rival| undecided(rival) || near(rival)) {
+    for rival in weighed(basis).iter().filter(|rival| undecided(rival) || near(rival)) {
         let hypothesis = Hypothesis::of(rival, undecided(rival), &data, name)?;
-        if let Some(other) = design.hypotheses.iter().find(|other| other.same_model(&hypothesis)) {
+        if let Some(other) = design.hypotheses.iter().find(|other| other.same_spring(&hypothesis)) {
             remarks.extend(hypothesis.named.then(|| {
                 format!(
                     "{} and {} differ in one record's readings alone: run the same schedule again",
@@ -210,6 +212,7 @@ fn finished(
         probability: undecided.then(|| odds::of_all(&evaluation.pairs, &nats, &named)),
         minutes: time(frame.rows) / 60.0,
         range_v: [volts(frame.low_v), volts(frame.high_v)],
+        suspects: Vec::new(),
         separations: separations.collect(),
         parts: parts(design, best, commands, evaluation, &time, &volts),
         intervals: intervals(design, commands),

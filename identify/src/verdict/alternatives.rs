@@ -9,6 +9,8 @@ use crate::search::{Evaluator, Scored, Search, effects};
 use crate::stats::thresholds::empirical::REVERSAL_OF_FULL_SCALE;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 
+/// The experiment that separates errors of the spring from those of the readings.
+const REPEAT: &str = "run the same schedule again: errors that repeat belong to the spring, the others to the readings";
 /// Words that follow an experiment which can be computed.
 const PLAN: &str = "; `vsj plan DIAGNOSIS.json` computes the schedule that shows most";
 /// Largest number of rivals that are listed.
@@ -77,10 +79,8 @@ pub(crate) fn next_experiment(
             Some(format!("run {}{computed}", effect.isolating_experiment()))
         }
         Verdict::Consistent if !wanders => None,
-        Verdict::Unexplained | Verdict::Consistent => Some(
-            "run the same schedule again: errors that repeat belong to the spring, the others to the readings"
-                .to_owned(),
-        ),
+        Verdict::Consistent => Some(REPEAT.to_owned()),
+        Verdict::Unexplained => Some(format!("{REPEAT}{PLAN}")),
         Verdict::Insufficient => Some(format!("{}{PLAN}", Unidentifiable::Excitation.next_experiment())),
         Verdict::Explained => None,
     }

@@ -58,7 +58,8 @@ pub struct Diagnosis {
     pub(crate) score: f64,
     /// The plant that was extended.
     pub(crate) base: Base,
-    /// The best structures, one for each set of causes, the best first; empty if no search was run.
+    /// The best structures, one for each set of causes, those of the suspects included, the best first; empty if no search was
+    /// run.
     pub(crate) contenders: Vec<Scored>,
     /// Root mean square of the structure that no cause explains, in normalised V.
     pub(crate) unexplained_v: f64,
@@ -137,9 +138,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         Verdict::Consistent => unmodelled.is_some(),
         Verdict::Unexplained | Verdict::Insufficient => true,
     };
-    let suspects = match verdict {
-        Verdict::Explained => Vec::new(),
-        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect),
+    let (suspects, sets): (Vec<_>, Vec<_>) = match verdict {
+        Verdict::Explained => Default::default(),
+        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect).into_iter().unzip(),
     };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let export = export(engine, found.model(), held);
@@ -182,6 +183,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         rivals: Vec::new(),
         experiment: None,
     };
+    found.add_contenders(sets);
     Diagnosis {
         report,
         data: data.clone(),
@@ -190,7 +192,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         held_out,
         ranking,
         equation: None,
-        zero_offsets: engine.zero_offsets(extended),
+        zero_offsets: engine.zero_offsets(&found.best.fit),
         observed: observed.clone(),
         held_out_in_place,
         score: found.best.score,

@@ -74,6 +74,16 @@ pub(crate) fn search(
 }
 
 impl Found {
+    /// Adds sets of causes that were evaluated after the search to the contenders.
+    pub(crate) fn add_contenders(&mut self, sets: Vec<Scored>) {
+        for set in sets {
+            if !self.contenders.iter().any(|known| effects(&known.fit.model) == effects(&set.fit.model)) {
+                self.contenders.push(set);
+            }
+        }
+        self.contenders.sort_by(|a, b| b.score.total_cmp(&a.score));
+    }
+
     /// The model of the best structure.
     pub(crate) fn model(&self) -> &Model {
         &self.best.fit.model

@@ -2,6 +2,7 @@
 
 use simulation::record::Record;
 
+use crate::answer::{Suspect, Verdict};
 use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
@@ -14,7 +15,7 @@ use crate::stats::thresholds::probability::RIVAL_ODDS;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::restore::parameter;
 
-/// Largest number of sets beyond those that the report names.
+/// Largest number of sets beyond those that the report names, unless there are more suspects and findings.
 const MOST_FURTHER: usize = 4;
 /// Sets that are worse than the best by more than this number of times the odds against a rival are left out unless the report
 /// names them or structure is left unexplained.
@@ -30,11 +31,25 @@ pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit
     let named = |model: &Model| diagnosis.report.alternatives.iter().any(|set| same(set, &names(model)));
     let unexplained = diagnosis.unexplained_v > 0.0;
     let near = |score: f64| unexplained || score > best.score - TIMES_RIVAL_ODDS * RIVAL_ODDS;
-    let others = || diagnosis.contenders.iter().filter(|it| it.fit.model.structure() != best.fit.model.structure());
-    let further = others().filter(|it| !named(&it.fit.model) && near(it.score)).take(MOST_FURTHER);
+    // The sets of the suspects, and those without a finding, in which a verdict that becomes `unexplained` later makes a suspect.
+    let is_suspect = |causes: &[&str]| {
+        let set = |suspect: &Suspect| suspect.with.iter().copied().chain([suspect.cause]).collect::<Vec<_>>();
+        diagnosis.report.suspects.iter().any(|suspect| same(causes, &set(suspect)))
+    };
+    let without_finding =
+        |causes: &[&str]| diagnosis.ranking.iter().any(|it| !it.best_without.is_empty() && same(causes, &it.causes));
+    let in_doubt = |model: &Model| {
+        let causes = names(model);
+        diagnosis.report.verdict != Verdict::Ambiguous && (is_suspect(&causes) || without_finding(&causes))
+    };
+    let others = diagnosis.contenders.iter().filter(|it| it.fit.model.structure() != best.fit.model.structure());
+    let (asked, others): (Vec<_>, Vec<_>) = others.partition(|it| named(&it.fit.model));
+    let (doubtful, others): (Vec<_>, Vec<_>) = others.into_iter().partition(|it| in_doubt(&it.fit.model));
+    let most = MOST_FURTHER.saturating_sub(doubtful.len());
+    let further = others.into_iter().filter(|it| near(it.score)).take(most);
     let mut engine = Engine::new(&diagnosis.data, &diagnosis.observed, &diagnosis.base);
     let mut rivals = vec![rival(&mut engine, &best.fit, 0.0)];
-    for other in others().filter(|it| named(&it.fit.model)).chain(further) {
+    for other in asked.into_iter().chain(doubtful).chain(further) {
         rivals.push(rival(&mut engine, &other.fit, other.score - best.score));
     }
     for set in &diagnosis.report.alternatives {

@@ -23,15 +23,15 @@ const MOST_SUSPECTS: usize = 5;
 /// Share of the work that is left for fits that no search has made, the rest for errors and intervals.
 const SHARE_OF_FITS: f64 = 0.4;
 
-/// The suspects beside the findings of the set `best`, the closest first: causes whose 95 % interval excludes that they have no
-/// effect. Sets that the search has evaluated are used; the best set extended by each other effect is fitted once, as far as the
-/// work allows. `may` says which causes are considered.
+/// The suspects beside the findings of the set `best`, the closest first, each with its set: causes whose 95 % interval excludes
+/// that they have no effect. Sets that the search has evaluated are used; the best set extended by each other effect is fitted
+/// once, as far as the work allows. `may` says which causes are considered.
 pub(crate) fn suspects(
     engine: &mut Engine,
     best: &Scored,
     explored: Explored,
     may: impl Fn(&'static str) -> bool,
-) -> Vec<Suspect> {
+) -> Vec<(Suspect, Scored)> {
     let budget = engine.budget();
     let mut search = Search::resumed(engine, explored);
     let mut sets: Vec<(usize, Scored)> = Vec::new();
@@ -51,7 +51,7 @@ pub(crate) fn suspects(
         if suspects.len() == MOST_SUSPECTS || budget.is_over() {
             break;
         }
-        suspects.extend(suspect(&mut search, best, effect, &set));
+        suspects.extend(suspect(&mut search, best, effect, &set).map(|suspect| (suspect, set)));
     }
     suspects
 }

@@ -1,7 +1,7 @@
 //! A plan as text for the terminal.
 
 use identify::plan::Plan;
-use identify::plan::answer::{Part, Sharper};
+use identify::plan::answer::{Part, Separation, Sharper, Suspected};
 use simulation::bad_input::number as exact;
 
 use crate::output::cells::line;
@@ -9,6 +9,8 @@ use crate::output::diagnosis::number::number;
 
 /// Largest number of parts that are listed.
 const MOST_PARTS: usize = 45;
+/// Largest number of pairs of which each is listed.
+const MOST_SEPARATIONS: usize = 20;
 
 /// The whole answer, but for the files that were written.
 pub fn text(plan: &Plan) -> String {
@@ -16,6 +18,11 @@ pub fn text(plan: &Plan) -> String {
     line(&mut text, &sentence(plan));
     for (index, set) in (1..).zip(&plan.decides) {
         line(&mut text, &format!("  [{index}] {}", causes(set)));
+    }
+    if !plan.suspects.is_empty() {
+        let (odds, confirmed) = ("odds today", "confirmed if true");
+        line(&mut text, &format!("\n{:<34} {odds:>12} {confirmed:>18}  hardest to reject", "suspect"));
+        plan.suspects.iter().for_each(|suspect| line(&mut text, &of_suspect(suspect)));
     }
     for remark in &plan.remarks {
         line(&mut text, &format!("{}.", capitalised(remark)));
@@ -26,9 +33,10 @@ pub fn text(plan: &Plan) -> String {
         line(&mut text, &of_part(part));
     }
     if !plan.separations.is_empty() {
-        line(&mut text, "");
+        let all = plan.separations.len() <= MOST_SEPARATIONS;
+        line(&mut text, if all { "" } else { "\nThe set that is hardest to reject if another is true:" });
         line(&mut text, &format!("{:>10} {:>12}  if true, against", "nats", "probability"));
-        for it in &plan.separations {
+        for it in plan.separations.iter().filter(|it| all || is_hardest(plan, it)) {
             let pair = format!("{}, against {}", causes(&it.truth), causes(&it.rival));
             line(&mut text, &format!("{:>10} {:>12.3}  {pair}", number(it.nats), it.probability));
         }
@@ -71,6 +79,12 @@ fn sentence(plan: &Plan) -> String {
     }
 }
 
+/// True if no other set is harder to reject where the same one is true.
+fn is_hardest(plan: &Plan, it: &Separation) -> bool {
+    let ease = |it: &Separation| [it.probability, it.nats];
+    plan.separations.iter().filter(|other| other.truth == it.truth).all(|other| ease(other) >= ease(it))
+}
+
 /// Names of a set.
 fn causes(set: &[String]) -> String {
     if set.is_empty() { "no cause".to_owned() } else { set.join(" + ") }
@@ -79,6 +93,12 @@ fn causes(set: &[String]) -> String {
 fn capitalised(sentence: &str) -> String {
     let mut letters = sentence.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn of_suspect(suspect: &Suspected) -> String {
+    let odds = format!("1 to {}", number((-suspect.nats).exp()));
+    let Suspected { cause, probability, rival, .. } = suspect;
+    format!("{cause:<34} {odds:>12} {probability:>18.3}  {}", causes(rival))
 }
 
 fn of_part(part: &Part) -> String {
