@@ -1,5 +1,7 @@
 //! The search for the best candidate: all schedules of the library, then random changes of the best, kept if they are better.
 
+use std::collections::BTreeMap;
+
 use crate::plan::candidate::Candidate;
 use crate::plan::library::{Random, changed};
 use crate::plan::separation::{Design, Evaluation};
@@ -30,10 +32,15 @@ pub(super) fn objective(evaluation: &Evaluation) -> f64 {
     if of_pair.is_empty() {
         return breadth;
     }
-    // A set that the diagnosis does not name may differ from a named one by a cause of no size, which nothing shows.
-    let named = evaluation.pairs.iter().zip(&of_pair).filter(|(pair, _)| pair.named);
-    let least = named.map(|(_, value)| *value).min_by(f64::total_cmp).unwrap_or(0.0);
-    least + MEAN * of_pair.iter().sum::<f64>() / of_pair.len() as f64 + breadth
+    // A set that the diagnosis does not name may differ from a named one by a cause of no size, which nothing shows. The hardest rival
+    // of each truth counts, so that a truth that no schedule confirms does not hide the others.
+    let mut hardest = BTreeMap::new();
+    for (pair, &value) in evaluation.pairs.iter().zip(&of_pair).filter(|(pair, _)| pair.named) {
+        let least = hardest.entry(pair.truth).or_insert(value);
+        *least = value.min(*least);
+    }
+    let of_truths = hardest.values().sum::<f64>() / hardest.len().max(1) as f64;
+    of_truths + MEAN * of_pair.iter().sum::<f64>() / of_pair.len() as f64 + breadth
 }
 
 /// Returns the best candidate that is found.
