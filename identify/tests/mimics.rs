@@ -1,6 +1,6 @@
 //! Causes that can stand in for each other are named each for itself.
 
-use identify::{Options, diagnose};
+use identify::{Options, Report, diagnose};
 use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
@@ -26,8 +26,8 @@ struct Spring {
 const PAPER: Spring =
     Spring { gain: 1.0, width_v: 0.0, bend: 0.0, share: 1.0 / 11.0, tau_s: 5.5, slow: (0.0, 40.0), leaks: (0.0, 30.0) };
 
-/// The causes that are named on a record of held levels with noise of 1 V, in alphabetical order.
-fn causes(spring: &Spring, levels: &[f64]) -> Vec<&'static str> {
+/// The report on a record of held levels with noise of 1 V.
+fn report(spring: &Spring, levels: &[f64]) -> Report {
     let mut state = 1u32;
     let mut uniform = move || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -50,8 +50,12 @@ fn causes(spring: &Spring, levels: &[f64]) -> Vec<&'static str> {
         Row { line: index + 2, time_s: SAMPLE_S * index as f64, voltage_v, measured: Some(reading) }
     };
     let record = Record { name: String::new(), rows: (0..HELD * levels.len()).map(&mut row).collect() };
-    let report = diagnose(&record, &Options::default()).unwrap();
-    let mut causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+    diagnose(&record, &Options::default()).unwrap()
+}
+
+/// The causes that are named, in alphabetical order.
+fn causes(spring: &Spring, levels: &[f64]) -> Vec<&'static str> {
+    let mut causes: Vec<_> = report(spring, levels).findings.iter().map(|finding| finding.cause).collect();
     causes.sort_unstable();
     causes
 }
@@ -68,6 +72,17 @@ fn a_gain_is_named_beside_hysteresis_and_beside_a_curve() {
     assert_eq!(causes(&curve, &LOOPS), ["gain-error", "static-nonlinearity"]);
     assert_eq!(causes(&Spring { width_v: 40.0, ..PAPER }, &LOOPS), ["hysteresis"]);
     assert_eq!(causes(&Spring { bend: 0.2, ..PAPER }, &LOOPS), ["static-nonlinearity"]);
+}
+
+/// The curve is that of the voltage, not of the voltage multiplied by the gain.
+#[test]
+fn a_gain_multiplies_the_curve_beside_it() {
+    let report = report(&Spring { gain: 0.9, bend: 0.2, ..PAPER }, &LOOPS);
+    let values: Vec<_> = report.findings.iter().flat_map(|finding| &finding.parameters).collect();
+    for (name, truth, tolerance) in [("gain", 0.9, 0.004), ("at_100_v", 84.0, 0.6), ("at_300_v", 276.0, 0.9)] {
+        let value = values.iter().find(|it| it.0 == name).expect("a parameter").1.value;
+        assert!((value - truth).abs() < tolerance, "{name}: {value}, {values:?}");
+    }
 }
 
 #[test]

@@ -46,6 +46,7 @@ impl Effect for GainError {
     }
 
     fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        chain.gain *= point[0];
         chain.law.push(|voltage| point[0] * voltage);
     }
 }

@@ -10,7 +10,7 @@
 //! | uneven | as cubic with the sign of the voltage, `x = u / full scale`: other curves for negative voltages |
 //!
 //! Every curve is fixed at 0 V and at the reference voltage of the nominal spring, where the static gain is 1: what is linear
-//! belongs to `gain-error`.
+//! belongs to `gain-error`, which multiplies the curve, `gain f(u)`.
 //!
 //! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
 //! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
@@ -221,7 +221,8 @@ impl Effect for StaticNonlinearity {
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
+        let gain = chain.gain;
         let law = if FORMS[form].1 { &mut chain.law_behind } else { &mut chain.law };
-        law.push(move |voltage| voltage * secant(form, point, voltage, data));
+        law.push(move |voltage| voltage * secant(form, point, voltage / gain, data));
     }
 }

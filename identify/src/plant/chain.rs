@@ -46,6 +46,8 @@ pub struct Chain<'a> {
     pub friction: LoadFriction,
     /// Static law from voltage to settled stiffness.
     pub law: Law<'a>,
+    /// Gain that the law contains: a curve is one of the signal divided by it.
+    pub gain: f64,
     /// A second bank of play operators, behind the relaxation.
     pub memory_behind: PlayBank,
     /// A second static law, behind the relaxation.
@@ -83,6 +85,7 @@ impl<'a> Chain<'a> {
             memory: PlayBank::of(file.memory.as_ref()),
             friction: LoadFriction::new(0.0),
             law: Law::of(file.law.as_ref()),
+            gain: 1.0,
             memory_behind: PlayBank::of(None),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
