@@ -85,12 +85,10 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let verdict = verdict(&joint);
     if verdict == Verdict::Unexplained && joint.report.verdict != verdict {
         credibility::in_unexplained(&mut joint.report.findings, 0.0);
-    }
-    if joint.report.verdict != verdict {
         let Report { findings, alternatives, .. } = &joint.report;
         joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
-        joint.report.verdict = verdict;
     }
+    joint.report.verdict = verdict;
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }
