@@ -113,6 +113,9 @@ pub fn read(
             "{name}: more than {most} MiB; expected at most that: keep every tenth row, or a part of the record"
         );
     }
+    if format.dialect.separator.is_some() {
+        bad_input!("{name}: --separator applies to CSV only, and this is {}; expected no separator", container.name());
+    }
     let read::Columns { columns, remarks } = match container {
         Container::Mcap => read::mcap::columns(name, &bytes, format, topic)?,
         Container::Parquet => read::parquet::columns(name, bytes, format)?,
