@@ -17,6 +17,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use simulation::bad_input;
+use simulation::csv_table::dialect::Dialect;
 use simulation::csv_table::text::{MOST_BYTES, Source};
 use simulation::record::{Format, MeasuredRecord, columns};
 
@@ -113,8 +114,11 @@ pub fn read(
             "{name}: more than {most} MiB; expected at most that: keep every tenth row, or a part of the record"
         );
     }
-    if format.dialect.separator.is_some() {
-        bad_input!("{name}: --separator applies to CSV only, and this is {}; expected no separator", container.name());
+    let Dialect { separator, decimal } = format.dialect;
+    for (option, is_given) in [("--separator", separator.is_some()), ("--decimal", decimal.is_some())] {
+        if is_given {
+            bad_input!("{name}: {option} applies to CSV only, and this is {}; expected none", container.name());
+        }
     }
     let read::Columns { columns, remarks } = match container {
         Container::Mcap => read::mcap::columns(name, &bytes, format, topic)?,
