@@ -80,10 +80,10 @@ fn separators(known: Option<Separator>, line: &str) -> impl Iterator<Item = Sepa
 fn is_header<'t>(line: &str, mut below: impl Iterator<Item = &'t str> + Clone, separator: Separator) -> bool {
     let header = Cells::of(line, separator);
     let columns = header.used;
-    if let Some(line) = below.clone().next() {
-        if Cells::of(line, separator).are_units_of(columns) {
-            below.next();
-        }
+    if let Some(line) = below.clone().next()
+        && Cells::of(line, separator).are_units_of(columns)
+    {
+        below.next();
     }
     let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();
     header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.are_row(columns))
