@@ -222,6 +222,13 @@ pub struct Finding {
     pub evidence: String,
 }
 
+impl Finding {
+    /// True if the cause is at least as likely true as untrue.
+    pub fn is_likely(&self) -> bool {
+        self.probability >= 0.5
+    }
+}
+
 /// A cause that comes close to a finding but is none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Suspect {

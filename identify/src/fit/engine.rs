@@ -6,6 +6,7 @@
 use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::fit::budget::{Budget, UNLIMITED};
+use crate::fit::known::Known;
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
@@ -64,6 +65,8 @@ mod work {
 
 /// Largest number of rounds of a fit.
 const ROUNDS: usize = 14;
+/// Largest number of rounds of the first fit of a block, which decides whether the block is fitted further.
+const FIRST_ROUNDS: usize = 6;
 /// The fit ends with a round that gains less than this, in nats.
 const LEAST_GAIN: f64 = 0.02;
 /// A step with a smaller predicted gain, in nats, is not tried.
@@ -231,24 +234,29 @@ impl<'a> Engine<'a> {
     /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
     /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
-        self.fit_across(model, law, |_| true)
-    }
-
-    /// Fits the same, but crosses discontinuities of the prediction by one effect only: when that is added to a model, those of
-    /// the others are where an earlier fit left them.
-    pub fn fit_added(&mut self, model: Model, law: &Noise, effect: usize) -> Fit {
-        self.fit_across(model, law, |block| block.effect == effect)
-    }
-
-    fn fit_across(&mut self, model: Model, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
+        let known = Known::default();
         let model = self.refine_searched(model, |_| true);
-        let model = self.levenberg_marquardt(model, law);
-        let here = self.evaluate(model);
-        self.across_jumps(here, law, crosses)
+        let (model, _) = self.levenberg_marquardt(model, law, &known, ROUNDS);
+        self.across_jumps(model, law, &known, |_| true)
     }
 
-    /// Continues fits beyond discontinuities of the prediction on either side as long as the likelihood increases.
-    fn across_jumps(&mut self, mut here: Fit, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
+    /// Moves the points of a model that extends a fit by a block to the likeliest near them, with the derivatives that are `known`
+    /// there. Returns the log-likelihood under `law`, in nats, as well.
+    pub fn approached(&mut self, model: Model, law: &Noise, known: &Known) -> (Model, f64) {
+        let model = self.refine_searched(model, |_| true);
+        self.levenberg_marquardt(model, law, known, FIRST_ROUNDS)
+    }
+
+    /// Completes a fit that was [approached](Engine::approached) by crossing discontinuities of the prediction by the effect that
+    /// was added: those of the others are where an earlier fit left them.
+    pub fn completed(&mut self, model: Model, law: &Noise, known: &Known, effect: usize) -> Fit {
+        self.across_jumps(model, law, known, |block| block.effect == effect)
+    }
+
+    /// Fits the law of the noise to a model, and continues the fit beyond discontinuities of the prediction on either side as long as
+    /// the likelihood increases.
+    fn across_jumps(&mut self, model: Model, law: &Noise, known: &Known, crosses: impl Fn(&Block) -> bool) -> Fit {
+        let mut here = self.evaluate(model);
         let sides = |index| [(index, -1.0), (index, 1.0)];
         for (index, side) in (0..here.model.blocks.len()).flat_map(sides) {
             if !crosses(&here.model.blocks[index].0) {
@@ -263,7 +271,7 @@ impl<'a> Engine<'a> {
                 let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
                 model.blocks[index].1 = point;
-                let model = self.levenberg_marquardt(model, law);
+                let (model, _) = self.levenberg_marquardt(model, law, known, ROUNDS);
                 let there = self.evaluate(model);
                 if there.log_likelihood > here.log_likelihood {
                     here = there;
@@ -322,7 +330,7 @@ impl<'a> Engine<'a> {
         noise.log_likelihood(residual, self.observed)
     }
 
-    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise) -> Model {
+    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise, known: &Known, rounds: usize) -> (Model, f64) {
         let bounds = model.coordinates(self.data);
         let mut points = model.points();
         for (point, bound) in points.iter_mut().zip(&bounds) {
@@ -332,11 +340,11 @@ impl<'a> Engine<'a> {
         let mut residual = self.residual(&model);
         let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
-        for _ in 0..ROUNDS {
+        for _ in 0..rounds {
             if self.budget.is_over() {
                 break;
             }
-            let jacobian = self.jacobian(&model, &noise, &residual);
+            let jacobian = self.jacobian_beside(known, &model, &noise, &residual);
             if jacobian.places.is_empty() {
                 break;
             }
@@ -371,7 +379,7 @@ impl<'a> Engine<'a> {
                 break;
             }
         }
-        model
+        (model, value)
     }
 
     /// Returns the derivatives of the prediction and the contribution of each row at a fit.
@@ -410,6 +418,12 @@ impl<'a> Engine<'a> {
     /// initial state follows with the weights and kernels that it has at the model (Kaufman's approximation of variable
     /// projection, BIT 15, 1975): one simulation for each column instead of one for each state of it as well.
     pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
+        self.jacobian_beside(&Known::default(), model, noise, residual)
+    }
+
+    /// Returns the same, with the columns that are known.
+    fn jacobian_beside(&mut self, known: &Known, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
+        let coordinates = Known::places(model);
         let bounds = model.coordinates(self.data);
         let points = model.points();
         let places: Vec<usize> = (0..points.len()).filter(|&place| bounds[place].fitted).collect();
@@ -417,6 +431,9 @@ impl<'a> Engine<'a> {
         let held = self.held_start(model);
         let residual = held.as_ref().map_or(residual, |held| &held.residual);
         let columns = places.iter().map(|&place| {
+            if let Some(column) = known.column(coordinates[place]) {
+                return column.clone();
+            }
             let bound = &bounds[place];
             let mut step = 1e-5 * (bound.highest - bound.lowest).min(1.0 + points[place].abs());
             if points[place] + step > bound.highest {

@@ -9,6 +9,7 @@ pub mod budget;
 pub mod engine;
 pub mod held_out;
 pub mod interval;
+pub mod known;
 pub mod leave_one_out;
 pub mod normal_equations;
 pub mod simulator;

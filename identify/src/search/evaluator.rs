@@ -1,10 +1,13 @@
 //! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
 
+use std::collections::HashSet;
+
 use crate::adequacy;
 use crate::effects::EFFECTS;
 use crate::effects::effect::{Effect, FitContext};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
+use crate::fit::known::Known;
 use crate::noise::{Noise, autocorrelation};
 use crate::search::initial_models::initial_models;
 use crate::search::penalty_factor::penalty_factor;
@@ -127,12 +130,27 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        let mut fits = Vec::new();
+        let known = Known::at(self, fit, &law);
+        let mut approached = Vec::new();
         for Extension { block, point, .. } in extensions {
             if self.is_over() {
                 break;
             }
-            fits.push(self.fit_added(fit.model.with(block, point), &law, block.effect));
+            let (model, value) = self.approached(fit.model.with(block, point), &law, &known);
+            approached.push((value - Evaluator::price(self, &block), block.effect, model));
+        }
+        approached.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut rank, mut seen) = (0, HashSet::new());
+        approached.retain(|(_, effect, _)| {
+            rank += 1;
+            seen.insert(*effect) || rank <= COMPLETED
+        });
+        let mut fits = Vec::new();
+        for (_, effect, model) in approached {
+            if self.is_over() {
+                break;
+            }
+            fits.push(self.completed(model, &law, &known, effect));
         }
         fits
     }
@@ -141,7 +159,9 @@ impl Evaluator for Engine<'_> {
         let extensions =
             extensions(self, fit, Breadth::default(), &|other| other == effect, f64::NEG_INFINITY).into_iter();
         let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
-        Some(self.fit_added(fit.model.with(block, point), &fit.noise, effect))
+        let known = Known::at(self, fit, &fit.noise);
+        let (model, _) = self.approached(fit.model.with(block, point), &fit.noise, &known);
+        Some(self.completed(model, &fit.noise, &known, effect))
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -198,6 +218,8 @@ impl Evaluator for Engine<'_> {
     }
 }
 
+/// First fits that are completed in addition to the best of each effect, those with the largest likelihood for their price.
+const COMPLETED: usize = 12;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.

@@ -18,15 +18,13 @@
 //! ```
 //!
 //! and what is then less likely true than untrue is a suspect, no finding. In other records what is improbable beside a likely finding
-//! is a suspect.
+//! is a suspect; what is less likely true than untrue makes the record ambiguous: a law that no cause describes may be in its place.
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
 use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
 use crate::verdict::extrapolation::Spoils;
 use crate::verdict::finding::explained;
 
-/// Probability of what is as likely true as untrue.
-const EVEN: f64 = 0.5;
 /// Probability below which nothing is a finding beside a likely one.
 const IMPROBABLE: f64 = 0.1;
 
@@ -78,27 +76,35 @@ pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
     findings.iter().any(|finding| !EXACT.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
 }
 
+/// The causes that are at least as likely true as untrue, where another is less likely than that and not improbable; `None` elsewhere.
+pub(crate) fn likely_alone(findings: &[Finding]) -> Option<Vec<&'static str>> {
+    let open = |finding: &Finding| !finding.is_likely() && finding.probability >= IMPROBABLE;
+    let likely = findings.iter().filter(|finding| finding.is_likely()).map(|finding| finding.cause);
+    (findings.iter().any(open) && findings.iter().any(is_likely_cause)).then(|| likely.collect())
+}
+
 /// Makes suspects of findings: in a record with the verdict `unexplained` of those that are less likely true than untrue, in another of
 /// the improbable ones beside a likely one, whose form they rather correct.
 pub(crate) fn unlikely_to_suspects(report: &mut Report) {
-    let least = match report.verdict {
-        Verdict::Unexplained => EVEN,
-        _ if report.findings.iter().any(is_likely_cause) => IMPROBABLE,
+    let unlikely = match report.verdict {
+        Verdict::Unexplained => taken_out(&mut report.findings, |finding| !finding.is_likely()),
+        _ if report.findings.iter().any(is_likely_cause) => {
+            taken_out(&mut report.findings, |finding| finding.probability < IMPROBABLE)
+        }
         _ => return,
     };
-    let unlikely = unlikely(&mut report.findings, least);
     report.suspects.splice(0..0, unlikely);
 }
 
 /// True for a cause, not proved by exact equality of readings, that is at least as likely true as untrue.
 fn is_likely_cause(finding: &Finding) -> bool {
-    !EXACT.contains(&finding.cause) && finding.probability >= EVEN
+    !EXACT.contains(&finding.cause) && finding.is_likely()
 }
 
-/// Takes the findings with a probability below `least` out; returns them as suspects, the likeliest first.
-fn unlikely(findings: &mut Vec<Finding>, least: f64) -> Vec<Suspect> {
+/// Takes unlikely findings out; returns them as suspects, the likeliest first.
+fn taken_out(findings: &mut Vec<Finding>, is_unlikely: impl Fn(&Finding) -> bool) -> Vec<Suspect> {
     let causes: Vec<&str> = findings.iter().map(|finding| finding.cause).collect();
-    let mut unlikely: Vec<Finding> = findings.extract_if(.., |finding| finding.probability < least).collect();
+    let mut unlikely: Vec<Finding> = findings.extract_if(.., |finding| is_unlikely(finding)).collect();
     unlikely.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let suspect = |Finding { cause, probability, parameters, rmse_before, rmse_after, .. }| Suspect {
         cause,
@@ -162,11 +168,23 @@ mod tests {
         assert!((0.89..0.9).contains(&large) && small < 0.5, "{large} {small}");
     }
 
+    fn probable(cause: &'static str, probability: f64) -> Finding {
+        Finding { probability, ..finding(cause, 2.0) }
+    }
+
+    #[test]
+    fn a_cause_less_likely_than_not_leaves_the_likely_ones_alone_as_an_alternative() {
+        let open = [probable("hysteresis", 0.9), probable("quantisation", 1.0), probable("delay", 0.3)];
+        assert_eq!(likely_alone(&open), Some(vec!["hysteresis", "quantisation"]));
+        assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.05)]), None, "a suspect");
+        assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.6)]), None);
+        assert_eq!(likely_alone(&[probable("delay", 0.3), probable("quantisation", 1.0)]), None, "no likely cause");
+    }
+
     #[test]
     fn what_is_less_likely_than_not_is_a_suspect() {
-        let probable = |cause, probability| Finding { probability, ..finding(cause, 2.0) };
         let mut findings = vec![probable("hum", 0.2), probable("drift", 0.6), probable("delay", 0.4)];
-        let suspects = unlikely(&mut findings, EVEN);
+        let suspects = taken_out(&mut findings, |finding| !finding.is_likely());
         assert!(findings.len() == 1 && findings[0].cause == "drift");
         let suspects: Vec<_> = suspects.into_iter().map(|it| (it.cause, it.probability, it.with)).collect();
         let expected = [("delay", Some(0.4), vec!["hum", "drift"]), ("hum", Some(0.2), vec!["drift", "delay"])];

@@ -125,7 +125,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         credibility::in_unexplained(&mut findings, share * after.rmse.powi(2));
     }
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
-    let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).collect();
+    let alone = credibility::likely_alone(&findings);
+    let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).chain(alone).collect();
     let would_show = (findings.is_empty() && !unexplained)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));

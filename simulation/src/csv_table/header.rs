@@ -80,9 +80,7 @@ fn separators(known: Option<Separator>, line: &str) -> impl Iterator<Item = Sepa
 fn is_header<'t>(line: &str, mut below: impl Iterator<Item = &'t str> + Clone, separator: Separator) -> bool {
     let header = Cells::of(line, separator);
     let columns = header.used;
-    if let Some(line) = below.clone().next()
-        && Cells::of(line, separator).are_units_of(columns)
-    {
+    if below.clone().next().is_some_and(|line| Cells::of(line, separator).are_units_of(columns)) {
         below.next();
     }
     let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();

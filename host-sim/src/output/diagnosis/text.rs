@@ -293,6 +293,14 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         let nothing = || "no error at all".to_owned();
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
         sentences.push(format!("Alternatives that the data cannot reject: {}.", rivals.collect::<Vec<_>>().join("; ")));
+        let unlikely = report.findings.iter().filter(|finding| !finding.is_likely()).map(|finding| finding.cause);
+        let unlikely: Vec<&str> = unlikely.collect();
+        if !unlikely.is_empty() {
+            sentences.push(format!(
+                "Less likely true than not: {}; a law that no cause describes may be in its place.",
+                unlikely.join(", ")
+            ));
+        }
     }
     if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
         let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
