@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
     /// Show every line of the log, also the summaries, one for each second of the run
-    #[arg(long, conflicts_with_all = ["link", "rivals", "blocks", "isolation"])]
+    #[arg(long, conflicts_with_all = ["rivals", "blocks", "isolation"])]
     log: bool,
     /// Run no script: wait for `vsj link unix:PATH` on this socket until Ctrl-C
     #[arg(long, value_name = "PATH", conflicts_with = "json")]
@@ -54,16 +54,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return isolation::run(args.opt, args.json);
     }
     let elf = build::image_with(&args.variant.features(), Board::Mps2, args.opt)?;
-    if let Some(socket) = &args.link {
-        let socket = std::path::absolute(socket)?;
-        eprintln!("talk to it with: vsj link unix:{} status", socket.display());
-        return emulator::serve(&elf, &socket, |line| println!("{line}"));
-    }
     let show = |line: &str| match is_shown(line, args.log) {
         true if args.json => eprintln!("{line}"),
         true => println!("{line}"),
         false => (),
     };
+    if let Some(socket) = &args.link {
+        let socket = std::path::absolute(socket)?;
+        eprintln!("talk to it with: vsj link unix:{} status", socket.display());
+        return emulator::serve(&elf, &socket, show);
+    }
     let run = emulator::play(&elf, "stair", emulator::SHIFT, show)?;
     let comparison = Comparison::new("stair", &run)?;
     if args.json {

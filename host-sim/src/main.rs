@@ -136,8 +136,9 @@ mod tests {
 
     #[test]
     fn every_example_in_a_help_text_fits_the_terminal_and_parses() {
-        let mut examples = 0;
-        for command in Cli::command().get_subcommands() {
+        let (mut examples, mut commands) = (0, vec![Cli::command()]);
+        while let Some(command) = commands.pop() {
+            commands.extend(command.get_subcommands().cloned());
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             for line in help.lines().filter(|line| line.starts_with("  ")) {
                 assert!(line.len() <= COLUMNS, "{} columns: {line}", line.len());

@@ -29,6 +29,22 @@ impl Client {
     }
 }
 
+/// The desired stiffness: a finite number, in V of equivalent static voltage unless Pa or N/m follows, in any case.
+///
+/// # Errors
+/// [`simulation::BadInput`] with the units that are known.
+pub fn desired(text: &str) -> Result<Desired> {
+    // The `e` of an exponent is no unit.
+    let unit = text.trim_start_matches(|letter: char| letter.is_ascii_digit() || "+-.eE".contains(letter));
+    let number = text[..text.len() - unit.len()].parse().ok().filter(|value: &f64| value.is_finite());
+    match (number, unit.trim_start().to_lowercase().as_str()) {
+        (Some(value), "" | "v") => Ok(Desired::ScaledVolts(value)),
+        (Some(value), "pa") => Ok(Desired::Pascal(value)),
+        (Some(value), "n/m") => Ok(Desired::NewtonPerMetre(value)),
+        _ => bad_input!("`{text}` is no stiffness; expected a finite number, alone or with V, Pa or N/m"),
+    }
+}
+
 /// The fault with a name or a number.
 ///
 /// # Errors

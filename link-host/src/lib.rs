@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
-//! | [`fault`] | the fault with a name or a number |
+//! | [`fault`], [`desired`] | the fault with a name or a number; the stiffness that a text with its unit names |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
 //! | [`StatusReport`], [`IsolationRow`], [`AdaptationRow`], [`Row`] | status, isolation bank, adaptation and telemetry of the MCU, as text and JSON |
 
@@ -16,7 +16,7 @@ mod report;
 mod requests;
 
 pub use client::{Client, Patience, heartbeat};
-pub use command::fault;
+pub use command::{desired, fault};
 pub use failure::Failure;
 pub use port::Port;
 pub use report::{AdaptationRow, IsolationRow, Row, StatusReport};

@@ -4,6 +4,7 @@ import json
 
 import polars
 import pytest
+import vsj
 from conftest import SAMPLE
 
 
@@ -31,3 +32,13 @@ def test_polars_reads_what_the_command_writes(command, tmp_path):
     assert frame.height == 701 and frame["time_s"][1] == 0.1 and frame["dac_code"].dtype == polars.Int64
     attributes = json.loads(polars.read_parquet_metadata(file)["PANDAS_ATTRS"])
     assert attributes["units"]["youngs_modulus_pa"] == "Pa"
+
+
+def test_paths_of_other_files_and_a_separator_of_a_frame_are_refused(sample):
+    for path, expected in (("a/run.Parquet", "the frame of pandas.read_parquet"), ("run.mcap", "the command vsj, which reads MCAP")):
+        with pytest.raises(vsj.BadInput) as error:
+            vsj.identify(path)
+        assert str(error.value) == f"{path}: the path of a record is that of a CSV file; expected {expected}"
+    with pytest.raises(vsj.BadInput) as error:
+        vsj.identify(sample, separator=";")
+    assert str(error.value) == "separator: applies to paths of CSV files only; expected none"

@@ -8,6 +8,8 @@ import numpy as np
 
 CONTRACT = ("time_s", "voltage_v", "stiffness")
 """Names of the columns of an array without names."""
+_READ_BY = {".parquet": "the frame of pandas.read_parquet", ".mcap": "the command vsj, which reads MCAP"}
+"""What takes the place of a path that is not that of a CSV file."""
 
 
 class RecordWarning(UserWarning):
@@ -29,7 +31,13 @@ def warn(remarks):
 
 def _record(data, name, options):
     if isinstance(data, (str, os.PathLike)):
-        return os.fspath(data), None
+        path = os.fspath(data)
+        other = _READ_BY.get(os.path.splitext(path)[1].lower())
+        if other is not None:
+            raise _bad_input(f"{path}: the path of a record is that of a CSV file; expected {other}")
+        return path, None
+    if options.get("separator") is not None:
+        raise _bad_input("separator: applies to paths of CSV files only; expected none")
     if isinstance(data, Mapping):
         return name.replace("DataFrame", "columns"), [(str(key), _cells(column)) for key, column in data.items()]
     columns = getattr(data, "columns", None)

@@ -17,6 +17,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use simulation::bad_input;
+use simulation::csv_table::dialect::Dialect;
 use simulation::csv_table::text::{MOST_BYTES, Source};
 use simulation::record::{Format, MeasuredRecord, columns};
 
@@ -112,6 +113,12 @@ pub fn read(
         bad_input!(
             "{name}: more than {most} MiB; expected at most that: keep every tenth row, or a part of the record"
         );
+    }
+    let Dialect { separator, decimal } = format.dialect;
+    for (option, is_given) in [("--separator", separator.is_some()), ("--decimal", decimal.is_some())] {
+        if is_given {
+            bad_input!("{name}: {option} applies to CSV only, and this is {}; expected none", container.name());
+        }
     }
     let read::Columns { columns, remarks } = match container {
         Container::Mcap => read::mcap::columns(name, &bytes, format, topic)?,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use record_files::{Cell, Column, Container, Sheet, Writer, open, read};
 use simulation::BadInput;
+use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
 use simulation::record::{ColumnNames, Format, MeasuredRecord};
 
 const BOTH: [Container; 2] = [Container::Mcap, Container::Parquet];
@@ -228,5 +229,16 @@ fn files_are_recognised_by_their_first_bytes() {
     assert!(open(&path("a.csv"), &Format::default(), None).is_ok());
     let error = open(&path("a.csv"), &Format::default(), Some("/a")).unwrap_err().to_string();
     assert!(error.contains("--topic applies to MCAP only"), "{error}");
+    let separated = Dialect { separator: Some(Separator::COMMA), ..Dialect::default() };
+    let points = Dialect { decimal: Some(Decimal::Point), ..Dialect::default() };
+    for (option, dialect) in [("--separator", separated), ("--decimal", points)] {
+        let format = Format { dialect, ..Format::default() };
+        assert!(open(&path("a.csv"), &format, None).is_ok());
+        for container in BOTH {
+            let error = read("x", container, Vec::new(), &format, None).unwrap_err().to_string();
+            let expected = format!("x: {option} applies to CSV only, and this is {}; expected none", container.name());
+            assert_eq!(error, expected);
+        }
+    }
     assert!(open(folder.path(), &Format::default(), None).unwrap_err().to_string().contains("cannot be read"));
 }

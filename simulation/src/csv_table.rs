@@ -1,6 +1,6 @@
 //! CSV tables with one header row, columns by name in any order, and comment lines that start with `#`.
 //!
-//! Columns may be separated by commas, semicolons, tabs or blanks; where it is not a comma, the decimal mark may be one.
+//! Columns may be separated by commas, semicolons, tabs, vertical bars or blanks; where it is not a comma, the decimal mark may be one.
 //!
 //! Errors are one line that names file, line, column and what was expected.
 

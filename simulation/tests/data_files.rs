@@ -470,9 +470,12 @@ fn separators_and_decimal_marks_can_be_forced() {
     let readings = |text: &str, format: &Format| {
         read(text, format).map(|read| read.record.rows.iter().filter_map(|row| row.measured).collect::<Vec<_>>())
     };
-    assert_eq!(readings("t_ms|u_V|x_mm\n0|0|1\n1|0|2\n", &forced("|", "")), Ok(vec![1.0, 2.0]));
+    assert_eq!(readings("t_ms:u_V:x_mm\n0:0:1\n1:0:2\n", &forced(":", "")), Ok(vec![1.0, 2.0]));
     assert_eq!(readings("t_ms,u_V,x_mm\n0,0,\"1,5\"\n1,0,2\n", &forced("", ",")), Ok(vec![1.5, 2.0]));
-    assert_eq!(readings("sep=|\nt_ms|u_V|x_mm\n0|0|1\n1|0|2\n", &Format::default()), Ok(vec![1.0, 2.0]));
+    assert_eq!(readings("sep=:\nt_ms:u_V:x_mm\n0:0:1\n1:0:2\n", &Format::default()), Ok(vec![1.0, 2.0]));
+    // Names with blanks and commas between bars.
+    let bars = "Time [ms] | Command, set [V] | Tip [mm]\n0 | 0 | 1,5\n1 | 0 | 2\n";
+    assert_eq!(readings(bars, &Format::default()), Ok(vec![1.5, 2.0]));
     let error = readings("t_ms;u_V;x_mm\n0;0;1,5\n", &forced(";", ".")).unwrap_err();
     assert!(error.contains("line 2, column x_mm: `1,5` is not a finite number"), "{error}");
 }

@@ -23,6 +23,8 @@ use tempfile::NamedTempFile;
 use xtask::build::{self, Opt};
 use xtask::shell;
 
+use super::warnings::Warnings;
+
 /// Longest time of a run on the host's clock; after it the emulator is stopped.
 pub(crate) const TIMEOUT: Duration = Duration::from_secs(120);
 
@@ -232,10 +234,10 @@ impl Log {
     }
 }
 
-/// Decodes a log up to its end and calls `show` with each line as `vsj log` prints it. An incomplete frame at the end
-/// is dropped: it was being written when the emulator stopped.
+/// Decodes a log up to its end, without QEMU's own warnings, and calls `show` with each line as `vsj log` prints it. An
+/// incomplete frame at the end is dropped: it was being written when the emulator stopped.
 pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl FnMut(&str)) -> Result<Log> {
-    let mut decoder = Decoder::new(formats);
+    let (mut decoder, mut warnings) = (Decoder::new(formats), Warnings::default());
     let mut log = Log { lines: Vec::new(), damage: None };
     let mut buffer = [0; 4096];
     loop {
@@ -243,7 +245,7 @@ pub(crate) fn decode(formats: Formats, source: &mut impl Read, mut show: impl Fn
         if length == 0 {
             return Ok(log);
         }
-        for item in decoder.feed(&buffer[..length]) {
+        for item in decoder.feed(&warnings.remove(&buffer[..length])) {
             let row = table_row(&item);
             show(&row);
             match item {

@@ -5,3 +5,4 @@
 
 pub(crate) mod comparison;
 pub(crate) mod emulator;
+mod warnings;

@@ -16,8 +16,8 @@ use super::choice::{INPUT, one_of};
 /// The records and how their files are written.
 #[derive(Args, Debug)]
 pub(crate) struct RecordArguments {
-    /// The records: tables with a header, separated by commas, semicolons, tabs or blanks, or MCAP or Parquet files; of at most
-    /// 1 000 000 rows and 512 MiB
+    /// The records: tables with a header, separated by commas, semicolons, tabs, `|` or blanks, or MCAP or Parquet files; of at
+    /// most 1 000 000 rows and 512 MiB
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
     /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of ISO 8601 time stamps; default: time_s
@@ -36,10 +36,10 @@ pub(crate) struct RecordArguments {
     /// File with these options as a table [columns]; options on the command line win
     #[arg(long, value_name = "FILE.toml")]
     columns: Option<PathBuf>,
-    /// Separator of the columns: `,`, `;`, `tab`, `blanks` or another character; default: found in the file
+    /// Separator of the columns of CSV files: `,`, `;`, `tab`, `blanks` or another character; default: found in the file
     #[arg(long, value_name = "SEPARATOR")]
     separator: Option<Separator>,
-    /// Decimal mark, `.` or `,`; default: found in the file
+    /// Decimal mark of CSV files, `.` or `,`; default: found in the file
     #[arg(long, value_name = "MARK")]
     decimal: Option<Decimal>,
     /// Topic of the messages of an MCAP file; default: the only one that has the columns

@@ -1,6 +1,7 @@
 //! Keys in, orders out. Space disarms in every mode; Ctrl-C and `q` disarm and end.
 
 use link::Desired;
+use link_host::desired;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::message::Order;
@@ -80,13 +81,11 @@ impl View {
         match code {
             KeyCode::Esc => return None,
             KeyCode::Enter => match desired(&text) {
-                Some(desired) => {
+                Ok(desired) => {
                     self.ordered_v = if let Desired::ScaledVolts(volts) = desired { Some(volts) } else { None };
                     return Some(Order::Set(desired));
                 }
-                None => {
-                    self.note(&format!("`{text}` is no target: expected a number, alone or with V, Pa or N/m"), true)
-                }
+                Err(error) => self.note(&error.to_string(), true),
             },
             KeyCode::Backspace => {
                 text.pop();
@@ -108,19 +107,6 @@ impl View {
         let to_v = (from_v + by_v).max(lowest_v).min(highest_v);
         self.ordered_v = Some(to_v);
         Some(Order::Set(Desired::ScaledVolts(to_v)))
-    }
-}
-
-/// Reads a target: a finite number, in V of equivalent static voltage unless a unit follows.
-fn desired(text: &str) -> Option<Desired> {
-    // The `e` of an exponent is no unit.
-    let unit = text.trim_start_matches(|letter: char| letter.is_ascii_digit() || "+-.eE".contains(letter));
-    let value = text[..text.len() - unit.len()].parse::<f64>().ok().filter(|value| value.is_finite())?;
-    match unit.to_lowercase().as_str() {
-        "" | "v" => Some(Desired::ScaledVolts(value)),
-        "pa" => Some(Desired::Pascal(value)),
-        "n/m" => Some(Desired::NewtonPerMetre(value)),
-        _ => None,
     }
 }
 

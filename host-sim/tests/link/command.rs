@@ -43,7 +43,14 @@ fn a_session(mcu: &Mcu) {
     assert_eq!(json(port, &["set", "300"])["target_v"], 300.0);
     let target = json(port, &["set", "1.5e9", "--unit", "pa"])["target_v"].as_f64().unwrap();
     assert!((target - 0.199e9 / 1.069e6).abs() < 1e-3, "{target}");
-    assert!(good(port, &["set", "0.25", "--unit", "N/m"]).starts_with("armed, target "));
+    let target = good(port, &["set", "0.25", "--unit", "N/m"]);
+    assert!(target.starts_with("armed, target "));
+    assert_eq!(good(port, &["set", "0.25N/m"]), target);
+    let said = bad(2, port, &["set", "0.25N/mm"]);
+    assert!(
+        said.ends_with("`0.25N/mm` is no stiffness; expected a finite number, alone or with V, Pa or N/m\n"),
+        "{said}"
+    );
     assert!(bad(2, port, &["set", "700.1"]).contains("out of range: expected 0 to 700 V"));
     assert!(bad(2, port, &["set", "-1"]).contains("out of range"));
     assert!(bad(2, port, &["set", "1", "--unit", "pa"]).contains("expected 1301000000 to 2049300000 Pa"));
@@ -315,6 +322,17 @@ fn another_version_and_a_wrong_baud_rate_are_named() {
     // A line that echoes its input.
     let port = fake(&folder.path().join("echo"), <[u8]>::to_vec);
     assert!(bad(1, &port, &["status", "--timeout", "0.2"]).contains("no valid answer"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_baud_rate_is_that_of_the_device() {
+    let mcu = Mcu::on_terminal(Setup::default());
+    for (arguments, expected) in [(&["status"][..], 115_200), (&["status", "--baud", "57600"], 57_600)] {
+        good(&mcu.port, arguments);
+        let terminal = rustix::termios::tcgetattr(File::open(&mcu.port).unwrap()).unwrap();
+        assert_eq!((terminal.input_speed(), terminal.output_speed()), (expected, expected));
+    }
 }
 
 #[test]

@@ -33,13 +33,11 @@ def main(arguments=None):
     parser = _parser()
     wanted = parser.parse_args(arguments)
     try:
+        _expect_no_ignored(parser, wanted)
         if wanted.cost:
             return _cost(wanted)
         if wanted.records is None:
             parser.error("RECORDS: expected a folder of records, or a manifest")
-        for name in ("cores", "price"):
-            if getattr(wanted, name) is not None:
-                parser.error(f"--{name}: applies to an estimate only; expected --cost")
         return _diagnose(wanted)
     except BadInput as error:
         return _said(error, 2)
@@ -47,6 +45,20 @@ def main(arguments=None):
         return _said(f"{error.filename or error}: not found", 2)
     except (OSError, RuntimeError) as error:
         return _said(error, 1)
+
+
+_OF_BOTH, _OF_ESTIMATES = ("out", "batch", "json", "cost"), ("cores", "price")
+"""Arguments of every run, and of an estimate alone; all others are of a diagnosis."""
+
+
+def _expect_no_ignored(parser, wanted):
+    for name, value in vars(wanted).items():
+        if name in _OF_BOTH or value == parser.get_default(name) or (name in _OF_ESTIMATES) == bool(wanted.cost):
+            continue
+        shown = "RECORDS" if name == "records" else f"--{name}"
+        if wanted.cost:
+            parser.error(f"{shown}: --cost diagnoses nothing and reads the results in --out; expected no {shown}")
+        parser.error(f"{shown}: applies to an estimate only; expected --cost")
 
 
 def _diagnose(wanted):

@@ -27,7 +27,7 @@ impl Separator {
     /// The comma.
     pub const COMMA: Self = Self(b',');
     /// The separators that are recognised, the rarest inside a name first.
-    pub(super) const USUAL: [Self; 4] = [Self(b'\t'), Self(b';'), Self::COMMA, Self::BLANKS];
+    pub(super) const USUAL: [Self; 5] = [Self(b'\t'), Self(b'|'), Self(b';'), Self::COMMA, Self::BLANKS];
 
     /// The separator that a spreadsheet's line `sep=;` names.
     pub(super) fn named_by(line: &str) -> Option<Self> {

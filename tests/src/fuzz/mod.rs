@@ -17,6 +17,8 @@ pub type Check = fn(&[u8]);
 /// Name of each format, as that of its target and corpus, and its check.
 pub const TARGETS: &[(&str, Check)] = &[
     ("csv", tables::csv),
+    ("mcap", tables::mcap),
+    ("parquet", tables::parquet),
     ("schedule", tables::schedule),
     ("plant", plants::plant),
     ("log", logs::log),

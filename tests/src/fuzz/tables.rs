@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use record_files::{Container, read};
 use simulation::csv_table::text::Source;
 use simulation::record::{Format, MEASURED, MeasuredRecord, Record};
 use simulation::schedule::{Between, Schedule};
@@ -16,6 +17,23 @@ pub(super) fn csv(bytes: &[u8]) {
             Ok(measured) => check_record(&measured),
             Err(error) => check_error(&error, "file"),
         }
+    }
+}
+
+/// A measured record as MCAP: what holds for a table of text.
+pub(super) fn mcap(bytes: &[u8]) {
+    container(Container::Mcap, bytes);
+}
+
+/// A measured record as Parquet: what holds for a table of text.
+pub(super) fn parquet(bytes: &[u8]) {
+    container(Container::Parquet, bytes);
+}
+
+fn container(container: Container, bytes: &[u8]) {
+    match read("file", container, bytes.to_vec(), &Format::default(), None) {
+        Ok(measured) => check_record(&measured),
+        Err(error) => check_error(&error, "file"),
     }
 }
 

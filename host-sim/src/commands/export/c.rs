@@ -20,9 +20,9 @@ use super::super::plant;
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  vsj export c                                        the report's spring
+  vsj export c                                 the report's spring
   vsj export c --plant spring.toml --out out/c --controller fast --limit-v 1000
-  vsj export c --known tau=5 --known share=5          a spring known to within 5 %
+  vsj export c --known tau=5 --known share=5   a spring known to within 5 %
 
 Exit codes: 0 success, 1 a file cannot be written, 2 bad arguments, a plant file that the tick cannot run.")]
 pub(crate) struct Arguments {

@@ -10,13 +10,12 @@ mod watch;
 
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
-use host_sim::link::{Client, Patience, Port, fault as parse_fault};
+use host_sim::link::{Client, Patience, Port, desired, fault as parse_fault};
 use host_sim::output::terminal::remark;
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
 use session::{Session, seconds};
-use simulation::bad_input;
 
 /// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, adaptation, watch, record, capture, model, settings
 #[derive(Args, Debug)]
@@ -26,7 +25,7 @@ use simulation::bad_input;
 Examples:
   vsj link /dev/ttyACM0 status
   vsj link /dev/ttyACM0 set 300 --arm --keep 60         arm, 300 V for a minute
-  vsj link /dev/ttyACM0 set 1.5e9 --unit pa --keep 5
+  vsj link /dev/ttyACM0 set 0.25N/m --keep 5
   vsj link unix:/tmp/mcu.sock watch                     the emulator
   vsj link /dev/ttyACM0 watch --udp                     live in PlotJuggler
   vsj link /dev/ttyACM0 record out.csv --input stair --arm
@@ -108,12 +107,12 @@ enum Command {
 
 #[derive(Args, Debug)]
 struct Set {
-    /// The desired stiffness
+    /// The desired stiffness, alone or with its unit: 300, 1.5e9Pa, 0.25N/m
     #[arg(allow_negative_numbers = true)]
-    value: f64,
-    /// Unit of the value: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip
-    #[arg(long, value_enum, default_value_t, ignore_case = true)]
-    unit: Unit,
+    value: String,
+    /// Unit of a value without one: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip; default: v
+    #[arg(long, value_enum, ignore_case = true)]
+    unit: Option<Unit>,
     /// Arm the MCU first
     #[arg(long)]
     arm: bool,
@@ -122,9 +121,20 @@ struct Set {
     keep: Option<f64>,
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+impl Set {
+    fn desired(&self) -> Result<Desired> {
+        let unit = match self.unit {
+            None => "",
+            Some(Unit::V) => "V",
+            Some(Unit::Pa) => "Pa",
+            Some(Unit::NPerM) => "N/m",
+        };
+        desired(&format!("{}{unit}", self.value))
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Unit {
-    #[default]
     V,
     Pa,
     #[value(alias = "N/m")]
@@ -141,11 +151,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Acknowledge { fault } => parse_fault(fault)?,
         _ => Fault::NONE,
     };
-    if let Command::Set(Set { value, .. }) = &arguments.command
-        && !value.is_finite()
-    {
-        bad_input!("{value} is not a stiffness; expected a finite number");
-    }
+    let target = match &arguments.command {
+        Command::Set(set) => set.desired()?,
+        _ => Desired::ScaledVolts(0.0),
+    };
     let keep = match &arguments.command {
         Command::Set(Set { keep, .. }) | Command::Arm { keep } => keep.map(|s| seconds("--keep", s, f64::INFINITY)),
         _ => None,
@@ -171,15 +180,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::Status => session.show_status(),
         Command::Set(set) => {
-            let desired = match set.unit {
-                Unit::V => Desired::ScaledVolts(set.value),
-                Unit::Pa => Desired::Pascal(set.value),
-                Unit::NPerM => Desired::NewtonPerMetre(set.value),
-            };
             if set.arm {
                 session.order(Request::Arm)?;
             }
-            let done = session.order(Request::Set(desired))?;
+            let done = session.order(Request::Set(target))?;
             session.show_and_keep(done, keep)
         }
         Command::Arm { .. } => {

@@ -8,14 +8,22 @@ use identify::record::scales::Scales;
 pub(super) fn interval(parameter: &Parameter, scales: &Scales) -> String {
     let &Parameter { value, low, high, dimension, .. } = parameter;
     let size = dimension.size_of_shown_unit(&scales.units);
-    let [value, low, high] = with_interval([value / size, low / size, high / size]);
-    let text = format!("{value} [{low}, {high}] {}", scales.unit(dimension));
-    text.trim_end().to_owned() + extrapolated(parameter)
+    let (value, interval) = with_interval([value / size, low / size, high / size]);
+    let words = [value, interval, scales.unit(dimension)];
+    let words: Vec<String> = words.into_iter().filter(|word| !word.is_empty()).collect();
+    words.join(" ") + extrapolated(parameter)
 }
 
-/// Formats a value and the ends of its interval with two significant digits of the interval's half-width; an interval without
-/// a width, and numbers of very different size, are formatted with four significant digits.
-pub(in crate::output) fn with_interval([value, low, high]: [f64; 3]) -> [String; 3] {
+/// Formats a value and its interval, `[low, high]`, with two significant digits of the interval's half-width, and with four
+/// significant digits where it has no width or the numbers are of very different size. The interval is empty where its ends
+/// are one number then: the value is fixed, or known to all digits that are shown.
+pub(in crate::output) fn with_interval(numbers: [f64; 3]) -> (String, String) {
+    let [value, low, high] = rounded(numbers);
+    let interval = if low == high { String::new() } else { format!("[{low}, {high}]") };
+    (value, interval)
+}
+
+fn rounded([value, low, high]: [f64; 3]) -> [String; 3] {
     let half = 0.5 * (high - low);
     let decimals = 1 - half.log10().floor().clamp(-99.0, 99.0) as i32;
     let large = value.abs().max(low.abs()).max(high.abs());
@@ -57,15 +65,30 @@ mod tests {
 
     #[test]
     fn digits_follow_the_width_of_the_interval() {
-        for (numbers, texts) in [
-            ([1.200_031, 1.199_874, 1.200_188], ["1.20003", "1.19987", "1.20019"]),
-            ([-70.6, -90.0, -51.2], ["-71", "-90", "-51"]),
-            ([645.653, 645.4621, 645.844], ["645.65", "645.46", "645.84"]),
-            ([0.001, -0.01, 0.012], ["0.001", "-0.010", "0.012"]),
-            ([5.0, 5.0, 5.0], ["5.000", "5.000", "5.000"]),
-            ([1e-12, 9e-13, 1.1e-12], ["1.000e-12", "9.000e-13", "1.100e-12"]),
+        for (numbers, value, interval) in [
+            ([1.200_031, 1.199_874, 1.200_188], "1.20003", "[1.19987, 1.20019]"),
+            ([-70.6, -90.0, -51.2], "-71", "[-90, -51]"),
+            ([645.653, 645.4621, 645.844], "645.65", "[645.46, 645.84]"),
+            ([0.001, -0.01, 0.012], "0.001", "[-0.010, 0.012]"),
+            ([1e-12, 9e-13, 1.1e-12], "1.000e-12", "[9.000e-13, 1.100e-12]"),
         ] {
-            assert_eq!(with_interval(numbers), texts);
+            assert_eq!(with_interval(numbers), (value.to_owned(), interval.to_owned()));
+        }
+    }
+
+    #[test]
+    fn an_interval_whose_ends_are_shown_alike_is_not_shown() {
+        for numbers in [[500.0, 500.0, 500.0], [500.0, 500.0 - 1e-9, 500.0 + 1e-9]] {
+            let parameter = Parameter {
+                value: numbers[0],
+                low: numbers[1],
+                high: numbers[2],
+                unit: "V".into(),
+                dimension: Dimension::ReadingDifference,
+                at_bound: false,
+                extrapolated_from_v: None,
+            };
+            assert_eq!(interval(&parameter, &Scales::default()), "500.0 V");
         }
     }
 }

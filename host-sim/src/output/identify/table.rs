@@ -11,8 +11,8 @@ pub(super) type Line = [String; 3];
 /// All quantities in the user's units.
 pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
     let line = |name: String, quantity: &Quantity, size: f64, unit: &str| {
-        let [value, low, high] = with_interval([quantity.value / size, quantity.low / size, quantity.high / size]);
-        [name, format!("{value} {unit}").trim_end().to_owned(), format!("[{low}, {high}]")]
+        let (value, interval) = with_interval([quantity.value / size, quantity.low / size, quantity.high / size]);
+        [name, format!("{value} {unit}").trim_end().to_owned(), interval]
     };
     let (nominal, reading, time) = (&report.nominal, report.unit.as_str(), &units.time);
     let per_voltage = format!("{reading}/{}", units.voltage.name);
