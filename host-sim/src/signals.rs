@@ -90,6 +90,9 @@ pub fn end(signal: i32) -> ! {
     }
     let folders = lock(&FOLDERS);
     for path in folders.iter() {
+        // Under another name first: a file that is created in it meanwhile would keep the folder.
+        let away = path.with_extension("away");
+        let path = if fs::rename(path, &away).is_ok() { &away } else { path };
         let _ = fs::remove_dir_all(path);
     }
     std::process::exit(128 + signal)
