@@ -7,7 +7,6 @@ use crate::effects::EFFECTS;
 use crate::effects::effect::{Effect, FitContext};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
-use crate::fit::known::Known;
 use crate::noise::{Noise, autocorrelation};
 use crate::search::initial_models::initial_models;
 use crate::search::penalty_factor::penalty_factor;
@@ -130,7 +129,7 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        let known = Known::at(self, fit, &law);
+        let known = self.known(fit, &law);
         let mut approached = Vec::new();
         for Extension { block, point, .. } in extensions {
             if self.is_over() {
@@ -159,7 +158,7 @@ impl Evaluator for Engine<'_> {
         let extensions =
             extensions(self, fit, Breadth::default(), &|other| other == effect, f64::NEG_INFINITY).into_iter();
         let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
-        let known = Known::at(self, fit, &fit.noise);
+        let known = self.known(fit, &fit.noise);
         let (model, _) = self.approached(fit.model.with(block, point), &fit.noise, &known);
         Some(self.completed(model, &fit.noise, &known, effect))
     }
