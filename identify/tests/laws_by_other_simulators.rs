@@ -168,11 +168,8 @@ fn sensor_that_overshoots_slightly_is_a_lag() {
         }
     }
     let (cause, report) = first(&overshoots);
-    // A strongly damped oscillation stands in for it in a search that ends too early: that explains nothing.
-    let stands_in = cause == "resonance" && report.verdict == Verdict::Unexplained;
-    assert!(stands_in || cause == "series-lag", "{report:?}");
-    assert!(stands_in || (value(&report, "zeta") - 0.7).abs() < 0.05, "{report:?}");
-    assert!(!stands_in || report.findings.iter().all(|finding| finding.probability < 0.9), "{report:?}");
+    assert_eq!(cause, "series-lag", "{report:?}");
+    assert!((value(&report, "zeta") - 0.7).abs() < 0.05, "{report:?}");
 }
 
 #[test]

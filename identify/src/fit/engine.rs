@@ -234,10 +234,9 @@ impl<'a> Engine<'a> {
     /// Fits the points of a model under a given law of the noise, whose scale is fitted as well, then the law to the
     /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
-        let known = Known::default();
         let model = self.refine_searched(model, |_| true);
-        let (model, _) = self.levenberg_marquardt(model, law, &known, ROUNDS);
-        self.across_jumps(model, law, &known, |_| true)
+        let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
+        self.across_jumps(model, law, |_| true)
     }
 
     /// Returns the derivatives at a fit, whitened by the law under which its extensions are fitted.
@@ -252,15 +251,16 @@ impl<'a> Engine<'a> {
         self.levenberg_marquardt(model, law, known, FIRST_ROUNDS)
     }
 
-    /// Completes a fit that was [approached](Engine::approached) by crossing discontinuities of the prediction by the effect that
-    /// was added: those of the others are where an earlier fit left them.
-    pub fn completed(&mut self, model: Model, law: &Noise, known: &Known, effect: usize) -> Fit {
-        self.across_jumps(model, law, known, |block| block.effect == effect)
+    /// Completes a fit that was [approached](Engine::approached), with derivatives of its own, and crosses discontinuities of the
+    /// prediction by the effect that was added: those of the others are where an earlier fit left them.
+    pub fn completed(&mut self, model: Model, law: &Noise, effect: usize) -> Fit {
+        let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), FIRST_ROUNDS);
+        self.across_jumps(model, law, |block| block.effect == effect)
     }
 
     /// Fits the law of the noise to a model, and continues the fit beyond discontinuities of the prediction on either side as long as
     /// the likelihood increases.
-    fn across_jumps(&mut self, model: Model, law: &Noise, known: &Known, crosses: impl Fn(&Block) -> bool) -> Fit {
+    fn across_jumps(&mut self, model: Model, law: &Noise, crosses: impl Fn(&Block) -> bool) -> Fit {
         let mut here = self.evaluate(model);
         let sides = |index| [(index, -1.0), (index, 1.0)];
         for (index, side) in (0..here.model.blocks.len()).flat_map(sides) {
@@ -276,7 +276,7 @@ impl<'a> Engine<'a> {
                 let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
                 model.blocks[index].1 = point;
-                let (model, _) = self.levenberg_marquardt(model, law, known, ROUNDS);
+                let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
                 let there = self.evaluate(model);
                 if there.log_likelihood > here.log_likelihood {
                     here = there;

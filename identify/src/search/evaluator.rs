@@ -149,7 +149,7 @@ impl Evaluator for Engine<'_> {
             if self.is_over() {
                 break;
             }
-            fits.push(self.completed(model, &law, &known, effect));
+            fits.push(self.completed(model, &law, effect));
         }
         fits
     }
@@ -160,7 +160,7 @@ impl Evaluator for Engine<'_> {
         let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
         let known = self.known(fit, &fit.noise);
         let (model, _) = self.approached(fit.model.with(block, point), &fit.noise, &known);
-        Some(self.completed(model, &fit.noise, &known, effect))
+        Some(self.completed(model, &fit.noise, effect))
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -218,7 +218,7 @@ impl Evaluator for Engine<'_> {
 }
 
 /// First fits that are completed in addition to the best of each effect, those with the largest likelihood for their price.
-const COMPLETED: usize = 12;
+const COMPLETED: usize = 4;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.
