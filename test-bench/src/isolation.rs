@@ -1,6 +1,8 @@
 //! A run of the isolation bank with the controller, on the host and on the target, for counting instructions and comparing results
 //! bit for bit.
 
+use core::hint::black_box;
+
 use firmware::control::{Stopwatch, whole_tick};
 use model::isolation::{self, Verdict};
 use model::units::Signal;
@@ -49,6 +51,8 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
         let noise = (drawn & 0x3f_ffff) as i32 - 0x1f_ffff;
         let fault = if tick < FAULT { 0 } else { stiffness >> 3 };
         let reading = ScaledStiffness(Signal::from_bits(stiffness + fault + noise));
+        // Complete before the stopwatch starts.
+        let reading = black_box(reading);
         stopwatch.start();
         bank.tick(&mut watching, output.applied, output.stiffness, Some(reading));
         stopwatch.stop();

@@ -4,7 +4,7 @@
 //! time is eliminated: `m_ij -= m_ki m_kj / m_kk`. What remains in the last element is the energy that the hypothesis leaves.
 
 use super::bank::{HYPOTHESES, Hypothesis, NESTED};
-use super::products::{Table, element};
+use super::products::{Sums, element};
 use super::{CAUSES, Cause, Config, Verdict, thresholds};
 use crate::units::saturated_to_32;
 
@@ -97,6 +97,22 @@ pub(super) struct Decision {
     pub(super) energies: (i64, i64),
 }
 
+/// A pivot to divide by.
+#[derive(Clone, Copy)]
+struct Divisor {
+    reciprocal: i32,
+    right: u8,
+}
+
+impl Divisor {
+    /// Returns `product / pivot`; its magnitude is below 2^31 if the product is that of two elements of the pivot's row.
+    #[inline(always)]
+    fn quotient(self, product: i64) -> i64 {
+        let scaled = saturated_to_32(shifted_right(product, self.right));
+        (i64::from(scaled) * i64::from(self.reciprocal)) >> 30
+    }
+}
+
 impl Size {
     /// No size.
     const NEW: Self = Self { numerator: 0, denominator: 0, exponent: 0, scale: 0 };
@@ -126,6 +142,19 @@ fn shifted_right(value: i64, by: u8) -> i64 {
     let (high, low) = ((value >> 32) as i32, value as u32);
     let low = low >> by | (high << 1 << (31 - by)) as u32;
     i64::from(high >> by) << 32 | i64::from(low)
+}
+
+/// Returns `2^59 / mantissa`, rounded down, of a mantissa from 2^29 to 2^30 - 1. For a division of 64 bits the MCU calls a function of
+/// hundreds of instructions.
+fn reciprocal(mantissa: u32) -> i32 {
+    // 16 bits of it, from a mantissa of as many: too large by up to 2^-15 of itself, or too low by less than one.
+    let first = (1u32 << 31).checked_div(mantissa >> 14).unwrap_or(0);
+    let rest = (1 << 45) - i64::from(first) * i64::from(mantissa);
+    let second = (i64::from(first) << 14) + ((rest * i64::from(first)) >> 31);
+    // Too low by at most two or too large by at most one.
+    let rest = (1 << 59) - second * i64::from(mantissa);
+    let mantissa = i64::from(mantissa);
+    second as i32 - i32::from(rest < 0) + i32::from(rest >= mantissa) + i32::from(rest >= 2 * mantissa)
 }
 
 impl Decision {
@@ -187,7 +216,7 @@ impl Decision {
 
     /// Does one step.
     #[inline(never)]
-    pub(super) fn step(&mut self, config: &Config, copy: &Table<i64>, released: bool) {
+    pub(super) fn step(&mut self, config: &Config, copy: &Sums, released: bool) {
         let Some(hypothesis) = HYPOTHESES.get(usize::from(self.hypothesis)) else {
             return self.judge(config, released);
         };
@@ -203,29 +232,28 @@ impl Decision {
         }
     }
 
-    fn scale(&mut self, copy: &Table<i64>, last: u8) {
-        let mut index = usize::from(self.offset);
-        for (row, scale) in self.scales.iter_mut().enumerate().take(usize::from(last) + 1) {
-            let diagonal = element(copy, index);
-            let bits = 64 - diagonal.leading_zeros();
-            *scale = (bits.saturating_sub(BITS - 1) / 2) as u8;
-            index += usize::from(last) + 1 - row;
+    fn scale(&mut self, copy: &Sums, last: u8) {
+        let (mut index, last) = (usize::from(self.offset), usize::from(last));
+        for row in 0..last + 1 {
+            let bits = 64 - element(copy, index).leading_zeros();
+            self.scales[row & 7] = (bits.saturating_sub(BITS - 1) / 2) as u8;
+            index += last + 1 - row;
         }
         (self.row, self.pivot) = (0, 0);
         self.information = 0;
         self.stage = Stage::Load;
     }
 
-    fn load(&mut self, copy: &Table<i64>, last: u8) {
-        let row = self.row;
-        let mine = self.scales[usize::from(row) & 7];
-        for column in row..=last {
-            let sum = element(copy, self.offset.into());
-            let shift = u32::from(mine) + u32::from(self.scales[usize::from(column) & 7]);
-            self.matrix[at(row, column)] = saturated_to_32(sum >> (shift & 63));
-            self.offset += 1;
+    fn load(&mut self, copy: &Sums, last: u8) {
+        let (row, last, mut number) = (usize::from(self.row), usize::from(last), usize::from(self.offset));
+        let mine = u32::from(self.scales[row & 7]);
+        for column in row..last + 1 {
+            let shift = mine + u32::from(self.scales[column & 7]);
+            self.matrix[(row * 8 + column) & 63] = saturated_to_32(element(copy, number) >> (shift & 63));
+            number += 1;
         }
-        self.own[usize::from(row) & 7] = self.matrix[at(row, row)];
+        self.offset = number as u16;
+        self.own[row & 7] = self.matrix[(row * 9) & 63];
         self.row += 1;
         if row == last {
             self.stage = Stage::Pivot;
@@ -250,37 +278,38 @@ impl Decision {
         }
         let left = diagonal.leading_zeros().saturating_sub(2).min(29);
         self.right = (29 - left) as u8;
-        let mantissa = i64::from(diagonal) << left;
-        self.reciprocal = (1i64 << 59).checked_div(mantissa).unwrap_or(0) as i32;
+        self.reciprocal = reciprocal((diagonal as u32) << left);
         self.information = diagonal;
         (self.row, self.column) = (k + 1, k + 1);
         self.stage = Stage::Eliminate;
     }
 
-    /// Returns `product / pivot`; its magnitude is below 2^31 if the product is that of two elements of the pivot's row.
+    /// Returns the pivot for divisions.
     #[inline(always)]
-    fn quotient(&self, product: i64) -> i64 {
-        let scaled = saturated_to_32(shifted_right(product, self.right));
-        (i64::from(scaled) * i64::from(self.reciprocal)) >> 30
+    fn divisor(&self) -> Divisor {
+        Divisor { reciprocal: self.reciprocal, right: self.right }
     }
 
     fn eliminate(&mut self, last: u8) {
+        let (divisor, last) = (self.divisor(), u32::from(last));
+        let (k, mut i, mut j) = (u32::from(self.pivot), u32::from(self.row), u32::from(self.column));
+        let at = |row: u32, column: u32| (row * 8 + column) as usize & 63;
         for _ in 0..EACH {
-            let (k, i, j) = (self.pivot, self.row, self.column);
             let product = i64::from(self.matrix[at(k, i)]) * i64::from(self.matrix[at(k, j)]);
-            let new = i64::from(self.matrix[at(i, j)]) - self.quotient(product);
+            let new = i64::from(self.matrix[at(i, j)]) - divisor.quotient(product);
             self.matrix[at(i, j)] = saturated_to_32(new);
             if j < last {
-                self.column += 1;
+                j += 1;
             } else if i < last {
-                self.row += 1;
-                self.column = self.row;
+                i += 1;
+                j = i;
             } else {
                 self.pivot += 1;
                 self.stage = Stage::Pivot;
                 return;
             }
         }
+        (self.row, self.column) = (i as u8, j as u8);
     }
 
     fn bound(&mut self, config: &Config, last: u8) {
@@ -296,7 +325,7 @@ impl Decision {
             let outside = (i64::from(numerator) - end(highest)).max(end(lowest) - i64::from(numerator)).max(0);
             let outside = i64::from(saturated_to_32(outside)) >> 1;
             // The fit with the size at the nearer end of what is possible.
-            self.left += self.quotient(outside * outside) << 2;
+            self.left += self.divisor().quotient(outside * outside) << 2;
         }
         self.now = Size { numerator, denominator: self.information, exponent: exponent as i8, scale: mine };
         self.stage = Stage::Record;
@@ -412,5 +441,18 @@ impl Decision {
         self.energies = (self.none, left);
         self.rounds = self.rounds.wrapping_add(1);
         self.stage = Stage::Idle;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::reciprocal;
+
+    #[test]
+    fn a_reciprocal_is_that_of_a_long_division() {
+        let ends = [1 << 29, (1 << 29) + 1, (1 << 30) - 1, (1 << 30) - (1 << 14), (1 << 29) + (1 << 14) - 1];
+        for mantissa in ((1 << 29)..(1 << 30)).step_by(997).chain(ends) {
+            assert_eq!(i64::from(reciprocal(mantissa)), (1 << 59) / i64::from(mantissa), "{mantissa}");
+        }
     }
 }

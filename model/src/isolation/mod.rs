@@ -53,7 +53,7 @@ const SLOTS: usize = 64;
 /// Number of causes.
 const CAUSES: usize = Cause::ALL.len();
 /// Number of vectors that one tick whitens.
-const WHITENED: u32 = 3;
+const WHITENED: usize = 25;
 /// Largest whitened value, in standard deviations with 10 fraction bits: the products of two of them in all blocks fit 64 bits.
 const LARGEST: i32 = (1 << 24) - 1;
 
@@ -133,8 +133,9 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
     ticks: u32,
-    shift: u32,
-    slew_shift: u32,
+    /// One tick of a block, with 32 fraction bits, and one step of a slewed voltage.
+    part: i32,
+    slew_part: i32,
     /// Ticks of a quarter of a block, less one.
     quarter_mask: u32,
     fewest: u32,
@@ -155,7 +156,7 @@ pub struct Config {
     jump: WideGain,
     per_slew: [WideGain; 3],
     per_lag: [WideGain; 3],
-    /// With 31 fraction bits.
+    /// With 32 fraction bits; below one half, since the range is at least 50 V.
     whitening: i32,
     correlation: Option<Gain>,
     pinned_below: i32,
@@ -185,8 +186,8 @@ impl Validated<'_, Settings> {
         let bits = |value: f64, fraction: u32| steps(value, f64::from(1u32 << fraction)) as i32;
         Config {
             ticks,
-            shift: ticks.trailing_zeros(),
-            slew_shift: ticks.trailing_zeros() - bank::SLEW_TICKS.trailing_zeros(),
+            part: 1 << (32 - ticks.trailing_zeros()),
+            slew_part: (bank::SLEW_TICKS as i32) << (32 - ticks.trailing_zeros()),
             quarter_mask: ticks / 4 - 1,
             fewest: (settings.readings(block_s) * bank::FEWEST).div_ceil(256),
             reach: bank::SLEW_RATES
@@ -208,7 +209,7 @@ impl Validated<'_, Settings> {
             jump: WideGain::new(1024.0 / (2.0 * range)),
             per_slew: bank::SLEW_RATES.map(|rate| WideGain::new(rate * block_s / tau)),
             per_lag: bank::LAG_TAUS.map(|times| WideGain::new(block_s / (times * tau))),
-            whitening: bits(1.0 / (1024.0 * whitened_v), 31),
+            whitening: 2 * bits(1.0 / (1024.0 * whitened_v), 31),
             correlation: (correlation > 0.0).then(|| Gain::new(correlation)),
             pinned_below: signal(-3.0 * sigma_v).to_bits(),
             smallest: bank::SMALLEST.map(|(_, size)| bits(size, 28)),
@@ -232,13 +233,17 @@ pub struct State {
     filters: signatures::Filters,
     vectors: [i32; SLOTS],
     last: [i32; SLOTS],
-    whitened: [i32; SLOTS],
+    whitened: products::Whitened,
+    /// Place of the present block in its group.
+    place: usize,
+    /// Number of blocks of the group whose products are to be added.
+    held: usize,
     tests: sequential::Tests,
     products: products::Products,
     mode: products::Mode,
     decision: decision::Decision,
-    /// Step of the present block from which on the block before needs no work but that of a decision.
-    busy_until: u32,
+    /// Tick of the present block in which there is work to do next.
+    next: u32,
     alarmed: bool,
     blocks: u32,
     age: u32,
@@ -258,12 +263,14 @@ impl State {
         filters: signatures::Filters::NEW,
         vectors: [0; SLOTS],
         last: [0; SLOTS],
-        whitened: [0; SLOTS],
+        whitened: [[0; products::GROUP]; SLOTS],
+        place: 0,
+        held: 0,
         tests: sequential::Tests::NEW,
         products: products::Products::NEW,
         mode: products::Mode::NEW,
         decision: decision::Decision::NEW,
-        busy_until: 0,
+        next: IDLE,
         alarmed: false,
         blocks: 0,
         age: 0,
@@ -282,13 +289,20 @@ impl Default for State {
 }
 
 /// First tick of each part of a block's work.
-const WHITEN: u32 = signatures::STEPS;
-const TEST: u32 = WHITEN + (bank::VECTORS as u32 + 1).div_ceil(WHITENED);
-const ADD: u32 = TEST + sequential::STEPS;
+const WHITEN: u32 = 25;
+const TEST: u32 = 49;
+const ASSESS: u32 = TEST + sequential::STEPS;
+/// Its last steps, the longest, are not in the ticks that add up the sums.
+const ADD: u32 = 55;
 const CLOSE: u32 = ADD + products::STEPS as u32;
 /// First tick of the steps of a decision, which takes about 17 blocks with the 30 that are left in a block of 128 ticks.
 const DECIDE: u32 = 98;
-const _: () = assert!(CLOSE < DECIDE && bank::VECTORS < SLOTS, "the sums are complete before a decision begins");
+/// No tick: there is no work left.
+const IDLE: u32 = u32::MAX;
+const _: () = assert!(bank::VECTORS < SLOTS && signatures::STEPS <= WHITEN);
+const _: () = assert!(WHITEN + (bank::VECTORS as u32 + 1).div_ceil(WHITENED as u32) <= TEST);
+const _: () = assert!(bank::ROUND as usize >= products::GROUP, "no decision before a group is complete");
+const _: () = assert!(ASSESS <= ADD && CLOSE < DECIDE, "the sums are complete before a decision begins");
 
 impl Config {
     /// Returns the number of ticks of a block.
@@ -297,15 +311,24 @@ impl Config {
     }
 
     /// Advances the bank by one tick: applied voltage, the model's stiffness just after it was applied without the sensor's
-    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop. Not inlined: within a larger function the
-    /// MCU has too few registers for it.
-    #[inline(never)]
+    /// correction, and the reading at that time. No heap, no float, no panic, no unbounded loop.
+    #[inline]
     pub fn tick(&self, state: &mut State, applied: Volts, model: ScaledStiffness, reading: Option<ScaledStiffness>) {
-        let step = state.sums.ticks;
-        state.sums.add(self, applied, model, reading.map(|reading| reading.0));
+        let step = state.sums.keep(applied, model, reading);
+        if step as usize % sums::TOGETHER == sums::TOGETHER - 1 {
+            self.add(state, step);
+        } else if step == state.next {
+            self.work(state, step);
+        }
+    }
+
+    /// Adds the ticks that are kept; the last of them is `step`.
+    #[inline(never)]
+    fn add(&self, state: &mut State, step: u32) {
+        state.sums.add(self);
         if step + 1 == self.ticks {
             self.end_block(state);
-        } else if step < state.busy_until || step >= DECIDE && !state.decision.idle() {
+        } else if step == state.next {
             self.work(state, step);
         }
     }
@@ -318,14 +341,20 @@ impl Config {
         if state.means.pinned {
             state.means.pinned = *state.pinned_at.get_or_insert(state.means.last_reading) == state.means.last_reading;
         }
-        state.busy_until = if state.means.usable { ADD } else { u32::MAX };
+        state.next = 0;
     }
 
-    /// Does the work of one tick for the block before.
+    /// Does the work of one tick for the block before, and finds the next tick with work.
     #[inline(never)]
     fn work(&self, state: &mut State, step: u32) {
-        if step < WHITEN {
+        state.next = step + 1;
+        if step >= DECIDE {
+            self.decide(state);
+        } else if step < signatures::STEPS {
             signatures::step(self, state, step);
+            if step + 1 == signatures::STEPS {
+                state.next = WHITEN;
+            }
         } else if !state.means.usable {
             if step == WHITEN {
                 // A gap in the readings is a part of the time since the restart.
@@ -333,36 +362,47 @@ impl Config {
             }
             self.decide(state);
         } else if step < TEST {
-            self.whiten(state, (step - WHITEN) * WHITENED);
-        } else if step < ADD {
-            state.tests.step(self, step - TEST, &state.whitened);
-            if step + 1 == ADD {
+            self.whiten(state, (step - WHITEN) as usize);
+            if step > WHITEN {
+                state.next = TEST;
+            }
+        } else if step < ASSESS {
+            state.tests.step(self, step - TEST, &state.whitened, state.place);
+            if step + 1 == ASSESS {
                 self.assess(state);
             }
+        } else if state.held == 0 {
+            // The alarm has been acknowledged.
+            state.rest();
         } else if step < CLOSE {
-            if state.blocks > 0 {
-                state.products.step(step - ADD, state.mode, &state.whitened);
-                if step + 1 == CLOSE {
-                    self.close(state);
-                }
-            }
+            state.products.step(step - ADD, state.mode, &state.whitened);
         } else {
-            self.decide(state);
+            self.close(state);
         }
     }
 
-    /// Whitens some of the vectors, from slot `first` on.
+    /// Whitens a part of the vectors.
     #[inline(never)]
-    fn whiten(&self, state: &mut State, first: u32) {
+    fn whiten(&self, state: &mut State, part: usize) {
         state.vectors[bank::VECTORS] = state.means.residual;
-        for slot in first..first + WHITENED {
-            let slot = slot as usize & (SLOTS - 1);
-            let (new, last) = (state.vectors[slot], &mut state.last[slot]);
-            let predicted = self.correlation.map_or(0, |gain| gain.times(Signal::from_bits(*last)).to_bits());
-            let difference = new.saturating_sub(predicted);
-            let value = ((i64::from(difference) * i64::from(self.whitening)) >> 31) as i32;
-            state.whitened[slot] = value.clamp(-LARGEST - 1, LARGEST);
-            *last = new;
+        let block = state.place & (products::GROUP - 1);
+        let whitened = |difference: i32| {
+            (((i64::from(difference) * i64::from(self.whitening)) >> 32) as i32).clamp(-LARGEST - 1, LARGEST)
+        };
+        let vectors = state.vectors.as_chunks::<WHITENED>().0.get(part);
+        let slots = vectors.zip(state.whitened.as_chunks_mut::<WHITENED>().0.get_mut(part));
+        let Some(((new, slots), last)) = slots.zip(state.last.as_chunks_mut::<WHITENED>().0.get_mut(part)) else {
+            return;
+        };
+        if let Some(gain) = self.correlation {
+            for ((new, slot), last) in new.iter().zip(slots).zip(last) {
+                slot[block] = whitened(new.saturating_sub(gain.times(Signal::from_bits(*last)).to_bits()));
+                *last = *new;
+            }
+        } else {
+            for (new, slot) in new.iter().zip(slots) {
+                slot[block] = whitened(*new);
+            }
         }
     }
 
@@ -372,14 +412,15 @@ impl Config {
         let highest = state.tests.highest;
         if !state.alarmed && highest < self.restart {
             state.restart();
+            state.rest();
             return;
         }
-        state.busy_until = CLOSE;
         state.age = state.age.saturating_add(1);
-        state.mode.fresh = state.blocks == 0;
-        state.blocks += 1;
         let doubt = i64::from(state.tests.doubt);
-        state.doubted = if state.mode.fresh { 0 } else { state.doubted } + doubt * doubt;
+        state.doubted = if state.blocks == 0 { 0 } else { state.doubted } + doubt * doubt;
+        state.blocks += 1;
+        state.held += 1;
+        state.place += 1;
         if state.means.pinned && state.means.residual < self.pinned_below {
             state.pinned = true;
         } else if !state.means.pinned && state.pinned {
@@ -389,13 +430,22 @@ impl Config {
             state.alarmed = true;
         }
         state.since_decision += 1;
-        state.mode.copy = state.alarmed && state.since_decision >= bank::ROUND && state.decision.idle();
-        state.mode.halve = state.blocks >= bank::MOST_BLOCKS;
+        state.mode = products::Mode {
+            fresh: state.blocks as usize == state.held,
+            halve: state.blocks >= bank::MOST_BLOCKS,
+            copy: state.alarmed && state.since_decision >= bank::ROUND && state.decision.idle(),
+        };
+        if state.held == products::GROUP || state.mode.halve || state.mode.copy {
+            state.next = ADD;
+        } else {
+            state.rest();
+        }
     }
 
     /// Ends the work on the sums.
     #[inline(never)]
     fn close(&self, state: &mut State) {
+        state.held = 0;
         if state.mode.copy {
             state.decision.begin(state.blocks, state.doubted);
             state.since_decision = 0;
@@ -404,20 +454,28 @@ impl Config {
             state.blocks >>= 1;
             state.doubted >>= 1;
         }
-        state.mode = products::Mode::NEW;
+        state.rest();
     }
 
     #[inline(always)]
     fn decide(&self, state: &mut State) {
         if !state.decision.idle() {
             state.decision.step(self, &state.products.copy, state.released);
+        } else {
+            state.next = IDLE;
         }
     }
 }
 
 impl State {
+    /// Leaves no work for the present block but that of a decision.
+    fn rest(&mut self) {
+        self.next = if self.decision.idle() { IDLE } else { DECIDE };
+    }
+
     fn restart(&mut self) {
         self.filters.restart();
+        self.held = 0;
         (self.blocks, self.age, self.since_decision) = (0, 0, 0);
         (self.pinned, self.pinned_at, self.released) = (false, None, false);
     }
@@ -427,7 +485,6 @@ impl State {
         self.alarmed = false;
         self.tests = sequential::Tests::NEW;
         self.decision.reset();
-        self.mode = products::Mode::NEW;
         self.restart();
     }
 

@@ -2,21 +2,28 @@
 //! that several hypotheses have is summed once.
 
 use super::SLOTS;
-use super::bank::{HYPOTHESES, VECTORS};
+use super::bank::{HYPOTHESES, INITIAL, VECTORS};
 
-/// Number of products that one tick adds.
-const EACH: usize = 8;
-const _: () = assert!(EACH.is_multiple_of(2), "they are added in pairs");
+/// Number of products that one tick adds: three of each vector, or as many of two vectors.
+const EACH: usize = 12;
+/// Number of blocks whose products are added together: each sum is then loaded and stored once in as many blocks.
+pub(super) const GROUP: usize = 4;
+/// Whitened values of the blocks of a group, by vector.
+pub(super) type Whitened = [[i32; GROUP]; SLOTS];
+/// Number of ticks that take the products of each vector, the innovation included, with the nuisance, itself and the innovation.
+const OWN_STEPS: usize = (VECTORS + 1).div_ceil(EACH / 3);
 /// Number of elements of the matrices of all hypotheses: of each the upper triangle, row by row, the innovation as its last vector.
 const ELEMENTS: usize = elements();
-/// Number of ticks that the products of a block take.
-pub(super) const STEPS: usize = distinct().2.div_ceil(EACH);
-/// The different products of two vectors, in the order of the steps.
-pub(super) type Table<T> = [[T; EACH]; STEPS];
+/// Number of ticks that take the products of two other vectors.
+const CROSS_STEPS: usize = distinct().2.div_ceil(EACH);
+/// Number of ticks that the products of a group take.
+pub(super) const STEPS: usize = OWN_STEPS + CROSS_STEPS;
+/// The sum of each product, in the order of the steps.
+pub(super) type Sums = [i64; STEPS * EACH];
 
-/// The vectors of each product.
-static PAIRS: Table<(u8, u8)> = pairs();
-/// Product of each element of the matrices.
+/// The vectors of each product of two others.
+static PAIRS: [[(u8, u8); EACH]; CROSS_STEPS] = pairs();
+/// Place of each element of the matrices among the sums.
 static PLACES: [u8; ELEMENTS] = distinct().1;
 
 /// Returns the number of products of a hypothesis with `vectors` vectors.
@@ -33,7 +40,7 @@ const fn elements() -> usize {
     total
 }
 
-/// Returns the different pairs of vectors, the place of each element's pair among them, and their number.
+/// Returns the different products of two other vectors, the place of each element among the sums, and the number of the first.
 const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
     let (mut list, mut places, mut count) = ([(0, 0); ELEMENTS], [0; ELEMENTS], 0);
     let (mut element, mut index) = (0, 0);
@@ -43,16 +50,26 @@ const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
         while i <= vectors.len() {
             let mut j = i;
             while j <= vectors.len() {
-                let first = if i < vectors.len() { vectors[i] } else { VECTORS } as u8;
-                let second = if j < vectors.len() { vectors[j] } else { VECTORS } as u8;
-                let mut place = 0;
-                while place < count && !(list[place].0 == first && list[place].1 == second) {
-                    place += 1;
-                }
-                if place == count {
-                    list[count] = (first, second);
-                    count += 1;
-                }
+                let first = if i < vectors.len() { vectors[i] } else { VECTORS };
+                let second = if j < vectors.len() { vectors[j] } else { VECTORS };
+                let place = if first == second {
+                    3 * first + 1
+                } else if second == VECTORS {
+                    3 * first + 2
+                } else if first == INITIAL {
+                    3 * second
+                } else {
+                    let (first, second, mut place) = (first as u8, second as u8, 0);
+                    while place < count && !(list[place].0 == first && list[place].1 == second) {
+                        place += 1;
+                    }
+                    if place == count {
+                        list[count] = (first, second);
+                        count += 1;
+                    }
+                    OWN_STEPS * EACH + place
+                };
+                assert!(place < 256, "a place is an u8");
                 places[element] = place as u8;
                 element += 1;
                 j += 1;
@@ -61,12 +78,11 @@ const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
         }
         index += 1;
     }
-    assert!(count <= 256, "a place is an u8");
     (list, places, count)
 }
 
-const fn pairs() -> Table<(u8, u8)> {
-    let ((all, _, count), mut table, mut index) = (distinct(), [[(0, 0); EACH]; STEPS], 0);
+const fn pairs() -> [[(u8, u8); EACH]; CROSS_STEPS] {
+    let ((all, _, count), mut table, mut index) = (distinct(), [[(0, 0); EACH]; CROSS_STEPS], 0);
     while index < count {
         table[index / EACH][index % EACH] = all[index];
         index += 1;
@@ -76,17 +92,23 @@ const fn pairs() -> Table<(u8, u8)> {
 
 /// Returns the sum of an element's product; 0 if there is no such element.
 #[inline(always)]
-pub(super) fn element(sums: &Table<i64>, number: usize) -> i64 {
-    let place = PLACES.get(number).copied().unwrap_or(0) as usize;
-    sums.get(place / EACH).map_or(0, |row| row[place % EACH])
+pub(super) fn element(sums: &Sums, number: usize) -> i64 {
+    PLACES.get(number).and_then(|place| sums.get(usize::from(*place))).copied().unwrap_or(0)
 }
 
-/// What happens to the sums with the present block.
+/// Returns the sum of the products of two vectors over the blocks of a group.
+#[inline(always)]
+fn product(one: &[i32; GROUP], other: &[i32; GROUP]) -> i64 {
+    let block = |block: usize| i64::from(one[block]) * i64::from(other[block]);
+    block(0) + block(1) + block(2) + block(3)
+}
+
+/// What happens to the sums with the present group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mode {
-    /// The sums start with this block.
+    /// The sums start with this group.
     pub(super) fresh: bool,
-    /// The sums are halved after this block.
+    /// The sums are halved after this group.
     pub(super) halve: bool,
     /// The sums are copied for a decision.
     pub(super) copy: bool,
@@ -100,30 +122,33 @@ impl Mode {
 /// Sums of the products, in variances with 20 fraction bits, and their copy for a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Products {
-    sums: Table<i64>,
-    pub(super) copy: Table<i64>,
+    sums: Sums,
+    pub(super) copy: Sums,
 }
 
 impl Products {
     /// Before the first block.
-    pub(super) const NEW: Self = Self { sums: [[0; EACH]; STEPS], copy: [[0; EACH]; STEPS] };
+    pub(super) const NEW: Self = Self { sums: [0; STEPS * EACH], copy: [0; STEPS * EACH] };
 
     /// Adds the products of one step.
     #[inline(never)]
-    pub(super) fn step(&mut self, step: u32, mode: Mode, whitened: &[i32; SLOTS]) {
+    pub(super) fn step(&mut self, step: u32, mode: Mode, whitened: &Whitened) {
         let step = step as usize;
-        let rows = self.sums.get_mut(step).zip(self.copy.get_mut(step)).zip(PAIRS.get(step));
-        let Some(((sums, copy), pairs)) = rows else { return };
+        let (sums, copy) = (self.sums.as_chunks_mut::<EACH>().0, self.copy.as_chunks_mut::<EACH>().0);
+        let Some((sums, copy)) = sums.get_mut(step).zip(copy.get_mut(step)) else { return };
         if mode.fresh {
             *sums = [0; EACH];
         }
-        let product = |(i, j): (u8, u8)| {
-            i64::from(whitened[usize::from(i) & (SLOTS - 1)]) * i64::from(whitened[usize::from(j) & (SLOTS - 1)])
-        };
-        // Two in each round: the MCU's compiler does not unroll the loop.
-        for ([one, other], [first, second]) in sums.as_chunks_mut().0.iter_mut().zip(pairs.as_chunks().0) {
-            *one += product(*first);
-            *other += product(*second);
+        if let Some(pairs) = PAIRS.get(step.wrapping_sub(OWN_STEPS)) {
+            for (sum, (i, j)) in sums.iter_mut().zip(pairs) {
+                *sum += product(&whitened[usize::from(*i) & (SLOTS - 1)], &whitened[usize::from(*j) & (SLOTS - 1)]);
+            }
+        } else if let Some(vectors) = whitened.as_chunks::<{ EACH / 3 }>().0.get(step) {
+            for ([initial, own, innovation], vector) in sums.as_chunks_mut().0.iter_mut().zip(vectors) {
+                *initial += product(vector, &whitened[INITIAL]);
+                *own += product(vector, vector);
+                *innovation += product(vector, &whitened[VECTORS]);
+            }
         }
         if mode.copy {
             *copy = *sums;

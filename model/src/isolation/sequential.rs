@@ -10,11 +10,14 @@
 //! spring within the tolerance.
 
 use super::bank::{DOUBTFUL, SMALLEST, VECTORS};
+use super::products::{GROUP, Whitened};
 use super::{Config, LARGEST, SLOTS, thresholds};
 use crate::units::saturated_to_32;
 
 /// Number of ticks that the tests of a block take.
-pub(super) const STEPS: u32 = SMALLEST.len() as u32;
+pub(super) const STEPS: u32 = SMALLEST.len().div_ceil(EACH) as u32;
+/// Number of tests that one tick advances.
+const EACH: usize = 3;
 
 const ONE: f64 = 1_048_576.0;
 /// Least that one block adds, in nats with 20 fraction bits.
@@ -63,13 +66,17 @@ const fn largest_of_interest() -> f64 {
 /// Adds a bounded increment to a statistic.
 #[inline(always)]
 fn added(statistic: i32, nats: i64) -> i32 {
+    if statistic == 0 && nats <= 0 {
+        return 0;
+    }
     statistic.saturating_add(saturated_to_32(nats).clamp(LEAST, MOST)).max(0)
 }
 
 /// Sum of the magnitudes of the doubtful vectors times their sizes, in standard deviations with 10 fraction bits.
-fn doubt(sizes: &[i32; DOUBTFUL.len()], whitened: &[i32; SLOTS]) -> i32 {
-    let magnitude =
-        |(vector, size): (&usize, &i32)| (i64::from(whitened[vector & (SLOTS - 1)]).abs() * i64::from(*size)) >> 28;
+fn doubt(sizes: &[i32; DOUBTFUL.len()], whitened: &Whitened, block: usize) -> i32 {
+    let magnitude = |(vector, size): (&usize, &i32)| {
+        (i64::from(whitened[vector & (SLOTS - 1)][block]).abs() * i64::from(*size)) >> 28
+    };
     DOUBTFUL.iter().zip(sizes).map(magnitude).sum::<i64>().min(LARGEST.into()) as i32
 }
 
@@ -80,34 +87,34 @@ impl Tests {
 
     /// Advances the energy's test.
     #[inline(never)]
-    fn begin(&mut self, config: &Config, whitened: &[i32; SLOTS]) {
-        self.doubt = config.doubt.map_or(0, |sizes| doubt(&sizes, whitened));
-        let beyond = i64::from(whitened[VECTORS].saturating_abs().saturating_sub(self.doubt).max(0));
+    fn begin(&mut self, config: &Config, whitened: &Whitened, block: usize) {
+        self.doubt = config.doubt.map_or(0, |sizes| doubt(&sizes, whitened, block));
+        let beyond = i64::from(whitened[VECTORS][block].saturating_abs().saturating_sub(self.doubt).max(0));
         self.energy = added(self.energy, ((3 * beyond * beyond) >> 3) - LN_2);
         self.highest = self.energy;
     }
 
-    /// Advances one test; the whitened values have 10 fraction bits.
+    /// Advances some of the tests by a block of the group; the whitened values have 10 fraction bits.
     #[inline(never)]
-    pub(super) fn step(&mut self, config: &Config, step: u32, whitened: &[i32; SLOTS]) {
+    pub(super) fn step(&mut self, config: &Config, step: u32, whitened: &Whitened, block: usize) {
+        let block = block & (GROUP - 1);
         if step == 0 {
-            self.begin(config, whitened);
+            self.begin(config, whitened, block);
         }
-        let step = step as usize;
-        let statistics = self.upward.get_mut(step).zip(self.downward.get_mut(step));
-        let (Some((upward, downward)), Some(vector), Some(smallest)) =
-            (statistics, TESTED.get(step), config.smallest.get(step))
-        else {
-            return;
-        };
-        // 16 fraction bits.
-        let product = i64::from(whitened[usize::from(*vector) & (SLOTS - 1)]) * i64::from(*smallest);
-        let shift = (product >> 22) as i32;
-        let wide = |other: i32| i64::from(shift) * i64::from(other);
-        let along = wide(whitened[VECTORS]) >> 6;
-        let less = (wide(shift) >> 13) + ((i64::from(shift.unsigned_abs()) * i64::from(self.doubt)) >> 6);
-        *upward = added(*upward, along - less);
-        *downward = added(*downward, -along - less);
-        self.highest = self.highest.max(*upward).max(*downward);
+        let (innovation, doubt, mut highest) = (whitened[VECTORS][block], self.doubt as u32, self.highest);
+        let first = step as usize * EACH;
+        for test in first..(first + EACH).min(TESTED.len()) {
+            let (upward, downward) = (&mut self.upward[test], &mut self.downward[test]);
+            let value = whitened[usize::from(TESTED[test]) & (SLOTS - 1)][block];
+            // 16 fraction bits.
+            let shift = ((i64::from(value) * i64::from(config.smallest[test])) >> 22) as i32;
+            let wide = |other: i32| i64::from(shift) * i64::from(other);
+            let along = wide(innovation) >> 6;
+            let less = (wide(shift) >> 13) + ((i64::from(shift.unsigned_abs()) * i64::from(doubt)) >> 6);
+            *upward = added(*upward, along - less);
+            *downward = added(*downward, -along - less);
+            highest = highest.max(*upward).max(*downward);
+        }
+        self.highest = highest;
     }
 }

@@ -7,7 +7,7 @@ use crate::coefficient::{Rate, saturated, sum, upper};
 use crate::units::{Accumulator, Signal, saturated_to_32};
 
 /// Number of ticks that the vectors of a block take.
-pub(super) const STEPS: u32 = 25;
+pub(super) const STEPS: u32 = 6;
 
 /// One, with 20 fraction bits.
 const ONE: i32 = 1 << 20;
@@ -27,19 +27,17 @@ pub(super) struct Filters {
     end: i32,
     newest: usize,
     longest: i32,
-    /// Values of the present block that several steps use: the relaxed part of the model, the low-pass of its distance from the
-    /// voltage, the voltage as a fraction `p` of the range, and `p (1 - p)`.
+    /// Values of the present block that several steps use: the relaxed part of the model, and the voltage as a fraction of the range.
     relaxed: i32,
-    z: i32,
     part: i32,
-    bow: i32,
 }
 
-/// First-order low-pass; returns the mean of its values at both ends of the block.
+/// First-order low-pass; returns the mean of its values at both ends of the block. It stays within the range of a signal, since a rate
+/// is below one half: it covers no more than that of its distance to the input.
 #[inline(always)]
 fn low_pass(state: &mut Accumulator, rate: Rate, input: i32) -> i32 {
     let before = upper(*state);
-    *state = state.saturating_add(rate.step(Signal::from_bits(input).saturating_sub(before)));
+    *state += rate.step(Signal::from_bits(input).saturating_sub(before));
     (before.to_bits() >> 1) + (upper(*state).to_bits() >> 1)
 }
 
@@ -71,9 +69,7 @@ impl Filters {
         newest: 0,
         longest: 0,
         relaxed: 0,
-        z: 0,
         part: 0,
-        bow: 0,
     };
 
     /// Sets the nuisances to 256 V.
@@ -91,8 +87,6 @@ impl Filters {
                     vectors[(INITIAL + index) & (SLOTS - 1)] = upper(*nuisance).to_bits();
                     *nuisance -= rate.step(upper(*nuisance));
                 }
-            }
-            1 => {
                 let behind = Signal::from_bits(y).saturating_sub(Signal::from_bits(u));
                 let relaxed = sum(Signal::from_bits(y)) + config.share_over_rest.times(behind);
                 self.relaxed = saturated(relaxed).to_bits();
@@ -101,64 +95,34 @@ impl Filters {
                 vectors[OFFSET] = ONE;
                 let blocks = i64::from(age.min(MOST_BLOCKS));
                 vectors[DRIFT] = ((i64::from(y) * blocks) >> MOST_BLOCKS.trailing_zeros()) as i32;
-            }
-            2 => {
-                self.z = low_pass(&mut self.time_constant[0], config.rate, vectors[SHARE].saturating_neg());
-                vectors[TAU] = config.relaxing(self.z);
-            }
-            3 => {
-                let twice = low_pass(&mut self.time_constant[1], config.rate, self.z).saturating_mul(2);
-                vectors[TAU_CURVED] = config.relaxing(twice.saturating_sub(self.z));
-            }
-            4 => {
+                let z = low_pass(&mut self.time_constant[0], config.rate, vectors[SHARE].saturating_neg());
+                vectors[TAU] = config.relaxing(z);
+                let twice = low_pass(&mut self.time_constant[1], config.rate, z).saturating_mul(2);
+                vectors[TAU_CURVED] = config.relaxing(twice.saturating_sub(z));
                 self.part = times(config.per_range, u);
                 let behind = product(self.part, vectors[SHARE].saturating_neg());
                 vectors[TAU_VOLTAGE] = config.relaxing(low_pass(&mut self.time_constant[2], config.rate, behind));
             }
-            5 => {
+            1 => {
                 let first = low_pass(&mut self.creep[0], config.slow[0], u);
                 vectors[CREEP] = first.saturating_sub(self.relaxed);
                 vectors[CREEP_SLOWER] = low_pass(&mut self.creep[1], config.slow[1], u).saturating_sub(first);
-            }
-            6 => {
                 let first = low_pass(&mut self.leakage[0], config.slow[0], y);
                 vectors[LEAKAGE] = first.saturating_neg();
                 vectors[LEAKAGE_SLOWER] = first.saturating_sub(low_pass(&mut self.leakage[1], config.slow[1], y));
-            }
-            7 => vectors[PLAY] = self.play(config, u, 0),
-            8 => {
-                vectors[PLAY_SECOND] = self.play(config, u, 1);
-                vectors[PLAY_WIDER] = vectors[PLAY_SECOND].saturating_sub(vectors[PLAY]);
-            }
-            9 => vectors[PLAY_WIDEST] = self.play(config, u, 2).saturating_sub(vectors[PLAY_SECOND]),
-            10 => {
-                self.bow = product(self.part, ONE.saturating_sub(self.part));
-                let law = product(self.bow.saturating_mul(4), config.range);
+                let bow = product(self.part, ONE.saturating_sub(self.part));
+                let law = product(bow.saturating_mul(4), config.range);
                 vectors[LAW] = config.respond(&mut self.springs[3], law);
-            }
-            11 => {
-                let cubic = product(self.bow.saturating_mul(8), self.part.saturating_sub(ONE / 2));
+                let cubic = product(bow.saturating_mul(8), self.part.saturating_sub(ONE / 2));
                 vectors[LAW_CUBIC] = config.respond(&mut self.springs[4], product(cubic, config.range));
             }
-            12 => vectors[LIMIT] = self.limit(config, u, 0),
-            13 => vectors[LIMIT_MIDDLE] = self.limit(config, u, 1).saturating_sub(vectors[LIMIT]),
-            14 => vectors[LIMIT_TOP] = self.limit(config, u, 2).saturating_sub(vectors[LIMIT]),
-            15 => {
-                let pulse = times(config.jump, means.jumps).saturating_neg();
-                vectors[SLEW] = config.respond(&mut self.springs[8], pulse);
-            }
-            16 => {
-                vectors[SLEW_FIRST] = self.slew(config, means, 0);
-                vectors[SLEW_FASTER] = vectors[SLEW_FIRST].saturating_sub(vectors[SLEW]);
-            }
-            17 => {
-                vectors[SLEW_SECOND] = self.slew(config, means, 1);
-                vectors[SLEW_MIDDLE] = vectors[SLEW_SECOND].saturating_sub(vectors[SLEW_FIRST]);
-            }
-            18 => vectors[SLEW_SLOWER] = self.slew(config, means, 2).saturating_sub(vectors[SLEW_SECOND]),
-            19 => self.short_delays(means, vectors),
-            20 => self.long_delays(y, vectors),
-            21 => {
+            2 => {
+                vectors[PLAY] = self.play(config, u, 0);
+                vectors[PLAY_SECOND] = self.play(config, u, 1);
+                vectors[PLAY_WIDER] = vectors[PLAY_SECOND].saturating_sub(vectors[PLAY]);
+                vectors[PLAY_WIDEST] = self.play(config, u, 2).saturating_sub(vectors[PLAY_SECOND]);
+                self.short_delays(means, vectors);
+                self.long_delays(y, vectors);
                 for index in 0..6 {
                     vectors[DELAY_TO_QUARTER + index] = if index < 5 {
                         vectors[DELAY + index + 1].saturating_sub(vectors[DELAY + index])
@@ -167,18 +131,28 @@ impl Filters {
                     };
                 }
             }
-            22 => {
+            3 => {
                 vectors[LAG] = self.lag(config, y, 0);
                 vectors[LAG_SHORTER] = vectors[LAG].saturating_sub(vectors[DELAY]);
-            }
-            23 => {
                 vectors[LAG_SECOND] = self.lag(config, y, 1);
                 vectors[LAG_MIDDLE] = vectors[LAG_SECOND].saturating_sub(vectors[LAG]);
-            }
-            _ => {
                 vectors[LAG_LONGER] = self.lag(config, y, 2).saturating_sub(vectors[LAG_SECOND]);
                 vectors[PINNED] = if means.pinned { means.residual } else { 0 };
                 vectors[PINNED_BELOW] = vectors[PINNED].min(0);
+            }
+            4 => {
+                vectors[LIMIT] = self.limit(config, u, 0);
+                vectors[LIMIT_MIDDLE] = self.limit(config, u, 1).saturating_sub(vectors[LIMIT]);
+                vectors[LIMIT_TOP] = self.limit(config, u, 2).saturating_sub(vectors[LIMIT]);
+                let pulse = times(config.jump, means.jumps).saturating_neg();
+                vectors[SLEW] = config.respond(&mut self.springs[8], pulse);
+                vectors[SLEW_FIRST] = self.slew(config, means, 0);
+                vectors[SLEW_FASTER] = vectors[SLEW_FIRST].saturating_sub(vectors[SLEW]);
+            }
+            _ => {
+                vectors[SLEW_SECOND] = self.slew(config, means, 1);
+                vectors[SLEW_MIDDLE] = vectors[SLEW_SECOND].saturating_sub(vectors[SLEW_FIRST]);
+                vectors[SLEW_SLOWER] = self.slew(config, means, 2).saturating_sub(vectors[SLEW_SECOND]);
             }
         }
     }

@@ -164,7 +164,58 @@ fn signatures_of_the_size_of_the_range_fit_however_small_the_noise_is() {
         let settings = Settings { noise_v: 0.05, interval_s, ..Settings::PAPER };
         let config = settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
         // In standard deviations with 10 fraction bits.
-        let whitened = (i64::from(config.range) * i64::from(config.whitening)) >> 31;
+        let whitened = (i64::from(config.range) * i64::from(config.whitening)) >> 32;
         assert!(whitened <= i64::from(LARGEST), "{rate_hz} Hz: {whitened}");
+    }
+}
+
+/// Other rates, correlated noise, a model that is known to within a tolerance, readings that are missing and an acknowledged alarm: no
+/// tick of it may change unnoticed.
+#[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
+fn every_tick_is_the_same_to_the_bit() {
+    let tolerance = Tolerance { time_constant: 0.005, share: 0.01, gain: 0.002 };
+    let paper = Settings::PAPER;
+    for (rate_hz, settings, digest) in [
+        (100.0, Settings { interval_s: 0.01, ..paper }, 0x5a67_7647_2fa5_8c33),
+        (1000.0, paper, 0x01e6_784a_fdc1_0cd3),
+        (1000.0, Settings { noise_correlation_s: 0.05, ..paper }, 0x1cb5_0cf6_1471_03da),
+        (1000.0, Settings { tolerance, interval_s: 2e-3, ..paper }, 0x3244_3982_840d_f8db),
+        (2000.0, Settings { interval_s: 5e-4, ..paper }, 0x6eea_b257_68a9_f398),
+        (10_000.0, Settings { tolerance, noise_correlation_s: 0.05, ..paper }, 0x891b_b495_33ce_1271),
+    ] {
+        let config = settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
+        let (mut state, mut bits, mut all) = (State::default(), 7u32, 0xcbf2_9ce4_8422_2325u64);
+        let mut slow = 0i64;
+        // 3200 blocks of 128 ticks: beyond the number at which the sums are halved.
+        let (fault, gap, end) = (20_000, 150_000..170_000, 409_600u32);
+        for tick in 0..end {
+            let level = Signal::from_num([100, 300, 0, 650, 200][(tick / 4500) as usize % 5]);
+            slow += (i64::from(level.to_bits()) - slow) >> 12;
+            let model = Signal::from_bits((slow as i32 >> 1) + (level.to_bits() >> 1));
+            let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+            let error = if tick < fault { 0 } else { model.to_bits() >> 5 };
+            let heard = tick % 5 != 0 && !gap.contains(&tick);
+            let reading = heard.then(|| ScaledStiffness(Signal::from_bits(model.to_bits() + error) + noise));
+            config.tick(&mut state, Volts(level), ScaledStiffness(model), reading);
+            // Between whitening and tests of a block of 128 ticks.
+            if tick == 349_993 {
+                state.acknowledge();
+            }
+            let Report { verdict, since_blocks, size, energies } = state.report();
+            for value in [
+                i64::from(verdict.code()),
+                i64::from(since_blocks),
+                i64::from(size.numerator),
+                i64::from(size.denominator),
+                energies.0,
+                energies.1,
+                i64::from(state.decisions()),
+                i64::from(state.mean_voltage().0.to_bits()),
+            ] {
+                all = (all ^ value as u64).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+        assert_eq!(all, digest, "{rate_hz} Hz: {all:#x}");
     }
 }
