@@ -55,7 +55,7 @@ impl Effort {
 }
 
 /// Work for a record of at most [`ROWS`] rows at the normal effort.
-const WORK: f64 = 780e6;
+const WORK: f64 = 900e6;
 /// Rows up to which the work is constant.
 const ROWS: f64 = 4000.0;
 /// Exponent of the growth with the rows.

@@ -67,6 +67,8 @@ mod work {
 const ROUNDS: usize = 14;
 /// Largest number of rounds of the first fit of a block, which decides whether the block is fitted further.
 const FIRST_ROUNDS: usize = 6;
+/// Number of these after which most blocks are given up.
+const EARLY_ROUNDS: usize = 2;
 /// The fit ends with a round that gains less than this, in nats.
 const LEAST_GAIN: f64 = 0.02;
 /// A step with a smaller predicted gain, in nats, is not tried.
@@ -74,6 +76,16 @@ const LEAST_PREDICTED_GAIN: f64 = 0.1 * LEAST_GAIN;
 
 /// Largest number of discontinuities of the prediction that a fit crosses one after the other.
 const MOST_JUMPS: usize = 30;
+
+/// A model whose points were moved towards the likeliest.
+pub struct Approach {
+    /// The model.
+    pub model: Model,
+    /// Its log-likelihood under the law of the fit, in nats.
+    pub log_likelihood: f64,
+    /// True if a further round would gain nothing.
+    pub settled: bool,
+}
 
 /// The unknown initial state of a record at a model.
 struct HeldStart {
@@ -235,7 +247,7 @@ impl<'a> Engine<'a> {
     /// residual.
     pub fn fit(&mut self, model: Model, law: &Noise) -> Fit {
         let model = self.refine_searched(model, |_| true);
-        let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
+        let Approach { model, .. } = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
         self.across_jumps(model, law, |_| true)
     }
 
@@ -244,17 +256,24 @@ impl<'a> Engine<'a> {
         Known::of(&fit.model, self.jacobian(&fit.model, law, &fit.residual))
     }
 
-    /// Moves the points of a model that extends a fit by a block to the likeliest near them, with the derivatives that are `known`
-    /// there. Returns the log-likelihood under `law`, in nats, as well.
-    pub fn approached(&mut self, model: Model, law: &Noise, known: &Known) -> (Model, f64) {
+    /// Moves the points of a model that extends a fit by a block towards the likeliest near them, with the derivatives that are
+    /// `known` there.
+    pub fn approached(&mut self, model: Model, law: &Noise, known: &Known) -> Approach {
         let model = self.refine_searched(model, |_| true);
-        self.levenberg_marquardt(model, law, known, FIRST_ROUNDS)
+        self.levenberg_marquardt(model, law, known, EARLY_ROUNDS)
+    }
+
+    /// Goes on from there.
+    pub fn approach_further(&mut self, approach: &mut Approach, law: &Noise, known: &Known) {
+        if !approach.settled {
+            *approach = self.levenberg_marquardt(approach.model.clone(), law, known, FIRST_ROUNDS - EARLY_ROUNDS);
+        }
     }
 
     /// Completes a fit that was [approached](Engine::approached), with derivatives of its own, and crosses discontinuities of the
     /// prediction by the effect that was added: those of the others are where an earlier fit left them.
     pub fn completed(&mut self, model: Model, law: &Noise, effect: usize) -> Fit {
-        let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), FIRST_ROUNDS);
+        let Approach { model, .. } = self.levenberg_marquardt(model, law, &Known::default(), FIRST_ROUNDS);
         self.across_jumps(model, law, |block| block.effect == effect)
     }
 
@@ -276,7 +295,7 @@ impl<'a> Engine<'a> {
                 let Some(point) = block.effect().across_jumps(block.form, point, steps, self.data) else { break };
                 let mut model = here.model.clone();
                 model.blocks[index].1 = point;
-                let (model, _) = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
+                let Approach { model, .. } = self.levenberg_marquardt(model, law, &Known::default(), ROUNDS);
                 let there = self.evaluate(model);
                 if there.log_likelihood > here.log_likelihood {
                     here = there;
@@ -335,7 +354,7 @@ impl<'a> Engine<'a> {
         noise.log_likelihood(residual, self.observed)
     }
 
-    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise, known: &Known, rounds: usize) -> (Model, f64) {
+    fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise, known: &Known, rounds: usize) -> Approach {
         let bounds = model.coordinates(self.data);
         let mut points = model.points();
         for (point, bound) in points.iter_mut().zip(&bounds) {
@@ -345,12 +364,14 @@ impl<'a> Engine<'a> {
         let mut residual = self.residual(&model);
         let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
+        let mut settled = false;
         for _ in 0..rounds {
             if self.budget.is_over() {
                 break;
             }
             let jacobian = self.jacobian_beside(known, &model, &noise, &residual);
             if jacobian.places.is_empty() {
+                settled = true;
                 break;
             }
             let (normal, gradient) = normal_equations(&jacobian, &self.terms(&noise, &residual));
@@ -381,10 +402,11 @@ impl<'a> Engine<'a> {
                 damping *= 6.0;
             }
             if gained < LEAST_GAIN {
+                settled = true;
                 break;
             }
         }
-        (model, value)
+        Approach { model, log_likelihood: value, settled }
     }
 
     /// Returns the derivatives of the prediction and the contribution of each row at a fit.
@@ -507,8 +529,9 @@ mod tests {
             let known = if is_known { engine.known(&gain, &law) } else { Known::default() };
             let before = budget.spent();
             let model = gain.model.with(block("time-constant"), vec![5.5f64.ln()]);
-            let (model, value) = engine.approached(model, &law, &known);
-            (model.points(), value, budget.spent() - before)
+            let mut approach = engine.approached(model, &law, &known);
+            engine.approach_further(&mut approach, &law, &known);
+            (approach.model.points(), approach.log_likelihood, budget.spent() - before)
         };
         let (known, full) = (approached(true), approached(false));
         let near = |of: usize| (known.0[of] - full.0[of]).abs() < 0.003;

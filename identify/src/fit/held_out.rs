@@ -28,8 +28,8 @@ impl Engine<'_> {
         for fold in 0..self.data.folds {
             let model = whole.refitted(self, |row| usize::from(self.data.fold[row]) != fold);
             let there = if model == fit.model { fit.residual.clone() } else { self.residual(&model) };
-            let logs = fit.noise.row_log_likelihoods(&there, self.observed).zip(&self.data.fold);
-            log_likelihood += logs.filter(|(_, of)| usize::from(**of) == fold).map(|(log, _)| log).sum::<f64>();
+            let of_fold = |row: usize| usize::from(self.data.fold[row]) == fold;
+            log_likelihood += fit.noise.log_likelihood_where(&there, self.observed, of_fold);
         }
         log_likelihood - fit.cost()
     }

@@ -37,7 +37,7 @@ const LARGEST_ORDER_WITH_DIFFERENCE: usize = 12;
 /// Ratio of the frequencies that one section spans.
 const SECTION_RATIO: f64 = 4.0;
 /// Number of rows that are whitened at a time.
-const BLOCK: usize = 1024;
+const BLOCK: usize = 8;
 /// Error of a likelihood that is computed from the spectrum, in nats.
 const SPECTRUM_ERROR: f64 = 10.0;
 
@@ -116,18 +116,24 @@ impl Autocorrelation {
                 *before = std::mem::replace(value, *out);
             }
         }
-        let mut white = rough.clone();
-        // A block stays in the cache while all lags pass over it.
-        for (block, white) in white.chunks_mut(BLOCK).enumerate() {
-            let first = block * BLOCK;
-            for (lag, phi) in (1usize..).zip(&self.ar) {
-                let (early, rest) = white.split_at_mut(lag.saturating_sub(first).min(white.len()));
-                early.iter_mut().for_each(|white| *white -= phi * rough[0]);
-                for (white, earlier) in rest.iter_mut().zip(&rough[(first + early.len()).saturating_sub(lag)..]) {
-                    *white -= phi * earlier;
-                }
-            }
+        if self.ar.is_empty() {
+            return rough;
         }
+        let earlier = |row: usize, lag: usize| rough[row.saturating_sub(lag)];
+        let one =
+            |row: usize| (1..).zip(&self.ar).fold(rough[row], |white, (lag, phi)| white - phi * earlier(row, lag));
+        let first = self.ar.len().min(rough.len());
+        let mut white: Vec<f64> = (0..first).map(one).collect();
+        // The rows of a block stay in registers while all lags pass over them.
+        for block in rough[first..].as_chunks::<BLOCK>().0 {
+            let (row, mut block) = (white.len(), *block);
+            for (lag, phi) in (1..).zip(&self.ar) {
+                let earlier = &rough[row - lag..][..BLOCK];
+                block.iter_mut().zip(earlier).for_each(|(white, earlier)| *white -= phi * earlier);
+            }
+            white.extend_from_slice(&block);
+        }
+        white.extend((white.len()..rough.len()).map(one));
         white
     }
 }

@@ -14,9 +14,18 @@ const RELATIVE: f64 = 0.02;
 /// Largest width of a band, in radians per row: short compared with a period of the longest lag.
 const WIDEST: f64 = PI / 300.0;
 
-/// Mean frequency, in radians per row, and power of each band.
+/// A band of the spectrum.
+struct Band {
+    power: f64,
+    /// Cosine of its mean frequency in radians per row.
+    cosine: f64,
+    /// Logarithm of the squared gain of a first difference at that frequency.
+    ln_gain: f64,
+}
+
+/// The spectrum of some values.
 pub(super) struct BandSpectrum {
-    bands: Vec<(f64, f64)>,
+    bands: Vec<Band>,
 }
 
 impl BandSpectrum {
@@ -41,16 +50,20 @@ impl BandSpectrum {
                 }
             }
         }
-        Self { bands: bands.into_iter().map(|(sum, power)| (sum / power.max(1e-300), power)).collect() }
+        let band = |(sum, power): (f64, f64)| {
+            let frequency = sum / power.max(1e-300);
+            Band { power, cosine: frequency.cos(), ln_gain: 2.0 * (2.0 * (frequency / 2.0).sin()).ln() }
+        };
+        Self { bands: bands.into_iter().map(band).collect() }
     }
 
     /// Returns the autocovariances at lags 0 to `longest` after a fractional difference of order `power`.
     pub(super) fn correlation(&self, power: f64, longest: usize) -> Vec<f64> {
         let mut correlation = vec![0.0; longest + 1];
-        for &(frequency, of_band) in &self.bands {
-            let left = of_band * (2.0 * (frequency / 2.0).sin()).powf(2.0 * power);
+        for &Band { power: of_band, cosine, ln_gain } in &self.bands {
+            let left = if power == 0.0 { of_band } else { of_band * (power * ln_gain).exp() };
             // The recurrence is cos((k + 1) w) = 2 cos(w) cos(k w) - cos((k - 1) w).
-            let (mut before, mut now) = (frequency.cos(), 1.0);
+            let (mut before, mut now) = (cosine, 1.0);
             let twice = 2.0 * before;
             for sum in &mut correlation {
                 *sum += left * now;

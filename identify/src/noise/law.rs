@@ -94,25 +94,39 @@ impl Noise {
 
     /// Returns the contribution of a row to a fit, from its residual and its innovation, in V.
     pub fn term(&self, kind: Kind, residual: f64, innovation: f64) -> Term {
-        match kind {
-            // Rounded readings reach a bound half a step before it.
-            Kind::AtLeast => stopped(residual - self.half_step, self.marginal),
-            Kind::AtMost => {
-                let term = stopped(-residual - self.half_step, self.marginal);
-                Term { residual: -term.residual, ..term }
-            }
-            Kind::Exact if self.half_step > 0.0 => in_cell(residual, self.sigma, self.half_step),
-            Kind::Exact => self.exact_term(innovation),
+        match self.of_interval(kind, residual) {
+            Some((_, term)) => term,
+            None => Term { residual: innovation, weight: self.weight(innovation) },
         }
     }
 
-    pub(super) fn exact_term(&self, e: f64) -> Term {
-        let log = match self.outliers {
+    /// Returns the log-probability of a row's reading, up to a constant, from its residual and its innovation, in V.
+    pub fn log_density(&self, kind: Kind, residual: f64, innovation: f64) -> f64 {
+        self.of_interval(kind, residual).map_or_else(|| self.exact_log_density(innovation), |(log, _)| log)
+    }
+
+    /// Returns log-probability and term of a reading that is known up to an interval: it stopped at a bound, or was rounded to a
+    /// coarse step. Returns `None` for any other.
+    fn of_interval(&self, kind: Kind, residual: f64) -> Option<(f64, Term)> {
+        match kind {
+            // Rounded readings reach a bound half a step before it.
+            Kind::AtLeast => Some(stopped(residual - self.half_step, self.marginal)),
+            Kind::AtMost => {
+                let (log, term) = stopped(-residual - self.half_step, self.marginal);
+                Some((log, Term { residual: -term.residual, ..term }))
+            }
+            Kind::Exact if self.half_step > 0.0 => Some(in_cell(residual, self.sigma, self.half_step)),
+            Kind::Exact => None,
+        }
+    }
+
+    /// Returns the log-density of the innovation `e`, in V, of a reading that is not known up to an interval only.
+    pub(super) fn exact_log_density(&self, e: f64) -> f64 {
+        match self.outliers {
             Some(_) => self.densities(e).iter().sum::<f64>().max(1e-300).ln() - HALF_LN_TAU,
             None if self.nu.is_infinite() => self.constant - 0.5 * (e / self.sigma).powi(2),
             None => self.constant - 0.5 * (self.nu + 1.0) * ((e / self.sigma).powi(2) / self.nu).ln_1p(),
-        };
-        Term { log, residual: e, weight: self.weight(e) }
+        }
     }
 
     /// Returns minus the derivative of the log-density divided by the innovation, in 1/V^2.
@@ -142,31 +156,31 @@ impl Noise {
 
     /// Returns the same for a residual whose innovations are known.
     pub(super) fn log_likelihood_of(&self, residual: &[f64], white: &[f64], observed: &Observed) -> f64 {
-        let plain = self.half_step == 0.0 && self.outliers.is_none() && observed.all_exact();
-        if !plain {
-            let logs = residual.iter().zip(white).zip(&observed.kinds);
-            return logs.map(|((&residual, &white), &kind)| self.term(kind, residual, white).log).sum();
+        let rows = || residual.iter().zip(white).zip(&observed.kinds);
+        let log = |((&residual, &white), &kind): ((&f64, &f64), &Kind)| self.log_density(kind, residual, white);
+        if self.half_step > 0.0 || self.outliers.is_some() {
+            return rows().map(log).sum();
         }
-        let count = white.len() as f64 * self.constant;
+        let at_bounds = || rows().filter(|(_, kind)| **kind != Kind::Exact).map(log).sum();
+        let at_bounds: f64 = if observed.all_exact() { 0.0 } else { at_bounds() };
+        let white = &*observed.uncensored(white);
+        let constant = at_bounds + white.len() as f64 * self.constant;
         let variance = self.sigma * self.sigma;
         if self.nu.is_infinite() {
-            return count - 0.5 * dot(white, white) / variance;
+            return constant - 0.5 * dot(white, white) / variance;
         }
         // One logarithm of a product replaces eight; eight factors below 1e38 cannot overflow.
         let narrow = 1.0 / (self.nu * variance);
         let factor = |e: &f64| (1.0 + e * e * narrow).min(1e38);
         let logs: f64 = white.chunks(8).map(|chunk| chunk.iter().map(factor).product::<f64>().ln()).sum();
-        count - 0.5 * (self.nu + 1.0) * logs
+        constant - 0.5 * (self.nu + 1.0) * logs
     }
 
-    /// Returns the log-likelihood of each row, in nats.
-    pub fn row_log_likelihoods<'a>(
-        &'a self,
-        residual: &'a [f64],
-        observed: &'a Observed,
-    ) -> impl Iterator<Item = f64> + 'a {
+    /// Returns the log-likelihood of the rows that are `wanted`, in nats.
+    pub fn log_likelihood_where(&self, residual: &[f64], observed: &Observed, wanted: impl Fn(usize) -> bool) -> f64 {
         let white = self.innovations(&observed.errors(residual));
-        (0..residual.len()).map(move |row| self.term(observed.kinds[row], residual[row], white[row]).log)
+        let rows = (0..residual.len()).filter(|&row| wanted(row));
+        rows.map(|row| self.log_density(observed.kinds[row], residual[row], white[row])).sum()
     }
 
     /// Returns the cost of the law's parameters by Schwarz's criterion, in nats.
@@ -191,7 +205,7 @@ mod tests {
     fn rounded_reading_reaches_a_bound_half_a_step_before_it() {
         let noise = Noise { half_step: 2.5, sigma: 0.2, marginal: 0.2, ..Noise::robust(&normals(100)) };
         for (kind, side) in [(Kind::AtLeast, 1.0), (Kind::AtMost, -1.0)] {
-            let log = |residual: f64| noise.term(kind, side * residual, side * residual).log;
+            let log = |residual: f64| noise.log_density(kind, side * residual, side * residual);
             assert!(log(2.0) > 0.9f64.ln(), "{kind:?}: {}", log(2.0));
             assert!(log(3.0) < 0.1f64.ln(), "{kind:?}: {}", log(3.0));
         }
@@ -204,10 +218,10 @@ mod tests {
         mixture.outliers = Some((0.05, 8.0));
         for noise in [Noise::robust(&normals(100)), mixture] {
             for e in [0.3, 1.7, -4.0, 11.0] {
-                let log = |e| noise.exact_term(e).log;
+                let log = |e| noise.exact_log_density(e);
                 let slope = (log(e + 1e-5) - log(e - 1e-5)) / 2e-5;
-                let term = noise.exact_term(e);
-                assert!((slope + term.weight * e).abs() < 1e-4 * slope.abs(), "{e} {slope} {term:?}");
+                let weight = noise.weight(e);
+                assert!((slope + weight * e).abs() < 1e-4 * slope.abs(), "{e} {slope} {weight:?}");
             }
         }
     }

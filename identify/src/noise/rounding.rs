@@ -17,8 +17,8 @@ impl Noise {
             rows().filter(|(_, kind)| **kind != Kind::Exact).map(|(&residual, &kind)| (residual, kind)).collect();
         let log = |ln_sigma: f64| -> f64 {
             let noise = Self { sigma: ln_sigma.exp(), marginal: ln_sigma.exp(), ..self.clone() };
-            let at_bound: f64 = stopped.iter().map(|&(r, kind)| noise.term(kind, r, r).log).sum();
-            at_bound + total(&in_cells, |&(r, times)| times * in_cell(r, noise.sigma, noise.half_step).log)
+            let at_bound: f64 = stopped.iter().map(|&(r, kind)| noise.log_density(kind, r, r)).sum();
+            at_bound + total(&in_cells, |&(r, times)| times * in_cell(r, noise.sigma, noise.half_step).0)
         };
         let (mut low, mut high) =
             ((0.02 * self.half_step).max(FINEST_V.get()).ln(), (root_mean_square(residual) + self.half_step).ln());

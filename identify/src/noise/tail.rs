@@ -54,7 +54,7 @@ impl Noise {
         let sizes = &*sizes(innovations, start);
         let mut best = f64::NEG_INFINITY;
         let mut consider = |noise: &mut Self, tried: Self, cost: f64| {
-            let log: f64 = sizes.iter().map(|&(e, times)| times * tried.exact_term(e).log).sum::<f64>() - cost;
+            let log: f64 = sizes.iter().map(|&(e, times)| times * tried.exact_log_density(e)).sum::<f64>() - cost;
             if log > best {
                 best = log;
                 *noise = tried;

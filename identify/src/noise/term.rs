@@ -8,12 +8,9 @@ pub(super) const HALF_LN_TAU: f64 = 0.918_938_533_204_672_7;
 /// Half-width of a cell, in standard deviations of the noise, below which the density is taken as constant across the cell.
 const NARROW: f64 = 0.05;
 
-/// The contribution of one row to a fit: a log-probability, and the term `weight (residual - J delta)^2` of the normal
-/// equations.
+/// The contribution of one row to the normal equations of a fit: `weight (residual - J delta)^2`.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
-    /// Log-probability of the reading, up to a constant.
-    pub log: f64,
     /// Working residual, in V.
     pub residual: f64,
     /// Weight, in 1/V^2.
@@ -29,34 +26,35 @@ fn above(z: f64) -> f64 {
     0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// Returns the term of a reading that stopped at an upper bound, `residual` above the prediction, in V.
-pub(super) fn stopped(residual: f64, sigma: f64) -> Term {
+/// Returns the log-probability of a reading that stopped at an upper bound, `residual` above the prediction, in V, and its term.
+pub(super) fn stopped(residual: f64, sigma: f64) -> (f64, Term) {
     let z = residual / sigma;
     if z > 6.0 {
         // The tail probability approaches the density divided by `z`.
-        return Term { log: -0.5 * z * z - z.ln(), residual, weight: 1.0 / (sigma * sigma) };
+        return (-0.5 * z * z - z.ln(), Term { residual, weight: 1.0 / (sigma * sigma) });
     }
     let tail = above(z);
     let hazard = density(z) / tail;
     let information = (hazard * (hazard - z)).max(1e-6);
-    Term { log: tail.ln(), residual: sigma * hazard / information, weight: information / (sigma * sigma) }
+    (tail.ln(), Term { residual: sigma * hazard / information, weight: information / (sigma * sigma) })
 }
 
-/// Returns the term of a reading that was rounded to a cell of the given half-width, in V.
-pub(super) fn in_cell(residual: f64, sigma: f64, half_step: f64) -> Term {
+/// Returns the log-probability of a reading that was rounded to a cell of the given half-width, in V, up to a constant, and its
+/// term.
+pub(super) fn in_cell(residual: f64, sigma: f64, half_step: f64) -> (f64, Term) {
     if half_step < NARROW * sigma {
         // The density is nearly constant across the cell.
         let log = -0.5 * (residual / sigma).powi(2) - HALF_LN_TAU + (2.0 * half_step / sigma).ln();
-        return Term { log, residual, weight: 1.0 / (sigma * sigma) };
+        return (log, Term { residual, weight: 1.0 / (sigma * sigma) });
     }
     // The probability is symmetric.
     let side = if residual < 0.0 { -1.0 } else { 1.0 };
     let (a, b) = ((residual.abs() - half_step) / sigma, (residual.abs() + half_step) / sigma);
     if a > 6.0 {
-        return Term { log: -0.5 * a * a - a.ln(), residual: side * a * sigma, weight: 1.0 / (sigma * sigma) };
+        return (-0.5 * a * a - a.ln(), Term { residual: side * a * sigma, weight: 1.0 / (sigma * sigma) });
     }
     let probability = (above(a) - above(b)).max(1e-300);
     let score = (density(a) - density(b)) / probability;
     let information = (score * score + (b * density(b) - a * density(a)) / probability).max(1e-3);
-    Term { log: probability.ln(), residual: side * sigma * score / information, weight: information / (sigma * sigma) }
+    (probability.ln(), Term { residual: side * sigma * score / information, weight: information / (sigma * sigma) })
 }

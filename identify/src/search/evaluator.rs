@@ -1,13 +1,12 @@
 //! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
 
-use std::collections::HashSet;
-
 use crate::adequacy;
 use crate::effects::EFFECTS;
 use crate::effects::effect::{Effect, FitContext};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
+use crate::search::first_fits::first_fits;
 use crate::search::initial_models::initial_models;
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
@@ -129,29 +128,7 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        let known = self.known(fit, &law);
-        let mut approached = Vec::new();
-        for Extension { block, point, .. } in extensions {
-            if self.is_over() {
-                break;
-            }
-            let (model, value) = self.approached(fit.model.with(block, point), &law, &known);
-            approached.push((value - Evaluator::price(self, &block), block.effect, model));
-        }
-        approached.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (mut rank, mut seen) = (0, HashSet::new());
-        approached.retain(|(_, effect, _)| {
-            rank += 1;
-            seen.insert(*effect) || rank <= COMPLETED
-        });
-        let mut fits = Vec::new();
-        for (_, effect, model) in approached {
-            if self.is_over() {
-                break;
-            }
-            fits.push(self.completed(model, &law, effect));
-        }
-        fits
+        first_fits(self, fit, &law, extensions.into_iter().map(|it| (it.block, it.point)))
     }
 
     fn extended_by(&mut self, fit: &Fit, effect: usize) -> Option<Fit> {
@@ -159,8 +136,9 @@ impl Evaluator for Engine<'_> {
             extensions(self, fit, Breadth::default(), &|other| other == effect, f64::NEG_INFINITY).into_iter();
         let Extension { block, point, .. } = extensions.max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))?;
         let known = self.known(fit, &fit.noise);
-        let (model, _) = self.approached(fit.model.with(block, point), &fit.noise, &known);
-        Some(self.completed(model, &fit.noise, effect))
+        let mut approach = self.approached(fit.model.with(block, point), &fit.noise, &known);
+        self.approach_further(&mut approach, &fit.noise, &known);
+        Some(self.completed(approach.model, &fit.noise, effect))
     }
 
     fn price(&self, block: &Block) -> f64 {
@@ -217,8 +195,6 @@ impl Evaluator for Engine<'_> {
     }
 }
 
-/// First fits that are completed in addition to the best of each effect, those with the largest likelihood for their price.
-const COMPLETED: usize = 4;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.

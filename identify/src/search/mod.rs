@@ -24,6 +24,7 @@
 //! | `penalty_factor` | the penalty factor of a residual |
 //! | `initial_models` | models from which the search also starts, if the nominal spring is far from the record |
 //! | `evaluator` | what a search asks about structures, and its answer from a record |
+//! | `first_fits` | first fits of a structure's extensions |
 //! | `evaluated` | all structures evaluated so far, and the prices |
 //! | `structure_search` | the search |
 //! | `extend` | a structure's extensions: which are fitted, and which of those are evaluated |
@@ -33,6 +34,7 @@ mod evaluated;
 mod evaluator;
 mod explored;
 mod extend;
+mod first_fits;
 mod initial_models;
 mod penalty_factor;
 mod predicted_gain;

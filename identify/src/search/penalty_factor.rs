@@ -45,7 +45,7 @@ mod tests {
         let raised = |swing: f64| {
             let records = noise.chunks(2000).map(move |chunk| {
                 let swung = chunk.iter().enumerate().map(|(row, noise)| noise + swing * (0.008 * row as f64).sin());
-                penalty_factor(&swung.map(|residual| Term { log: 0.0, residual, weight: 1.0 }).collect::<Vec<_>>())
+                penalty_factor(&swung.map(|residual| Term { residual, weight: 1.0 }).collect::<Vec<_>>())
             });
             records.filter(|factor| *factor > 1.0).count()
         };

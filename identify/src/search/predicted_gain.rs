@@ -15,8 +15,10 @@ const DEPENDENT: f64 = 1e-6;
 /// Predicts gains for one fit, under one noise model.
 pub(super) struct GainPredictor {
     noise: Noise,
-    /// Whitened residual in scales of the noise, dimensionless.
+    /// Part of the whitened residual that the model's own parameters cannot change, in scales of the noise, dimensionless.
     residual: Vec<f64>,
+    /// Sum of the squares of the whole whitened residual.
+    total: f64,
     /// Square roots of the rows' weights, in 1/V.
     roots: Vec<f64>,
     /// Orthonormal basis of the changes that the model's own parameters can make.
@@ -28,7 +30,7 @@ impl GainPredictor {
     pub(super) fn new(engine: &mut Engine, fit: &Fit, noise: Noise) -> Self {
         let terms = engine.terms(&noise, &fit.residual);
         let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
-        let residual: Vec<f64> = terms.iter().map(|term| term.weight.sqrt() * term.residual).collect();
+        let mut residual: Vec<f64> = terms.iter().map(|term| term.weight.sqrt() * term.residual).collect();
         let Jacobian { columns, places } = engine.jacobian(&fit.model, &noise, &fit.residual);
         let (points, bounds) = (fit.model.points(), fit.model.coordinates(engine.data));
         let mut own: Vec<Vec<f64>> = Vec::new();
@@ -47,22 +49,24 @@ impl GainPredictor {
             let column: Vec<f64> = noise.whitened(state).iter().zip(&roots).map(|(value, root)| value * root).collect();
             add_direction(&mut own, column);
         }
-        Self { noise, residual, roots, own }
+        let total = dot(&residual, &residual);
+        remove(&mut residual, &own);
+        Self { noise, residual, total, roots, own }
     }
 
     /// Gain in log-likelihood, in nats, of the best multiple of `change` (a change of the residual, in V), 0 to
     /// [`LONGEST_STEP`].
     pub(super) fn predicted_gain(&self, change: &[f64]) -> f64 {
-        let mut change: Vec<f64> =
+        let change: Vec<f64> =
             self.noise.whitened(change).iter().zip(&self.roots).map(|(value, root)| value * root).collect();
-        remove(&mut change, &self.own);
-        let size = dot(&change, &change);
-        if size < 1e-9 {
+        let whole = dot(&change, &change);
+        let size = whole - self.own.iter().map(|direction| dot(direction, &change).powi(2)).sum::<f64>();
+        if size < (DEPENDENT * DEPENDENT * whole).max(1e-9) {
             return 0.0;
         }
         let along = dot(&self.residual, &change);
         let step = (along / size).clamp(0.0, LONGEST_STEP);
-        let total = dot(&self.residual, &self.residual);
+        let total = self.total;
         let part = ((2.0 * along - step * size) * step / total.max(1e-300)).clamp(0.0, 1.0 - 1e-9);
         // The scale of the noise would shrink with the residual, but not that of rounded rows, few of which are informative.
         let informative = if self.noise.half_step > 0.0 { total } else { self.residual.len() as f64 };
