@@ -6,7 +6,7 @@ use anyhow::Result;
 use identify::Input;
 use pyo3::prelude::*;
 use simulation::bad_input;
-use simulation::csv_table::dialect::Dialect;
+use simulation::csv_table::dialect::{Dialect, Separator};
 use simulation::csv_table::text::Source;
 use simulation::record::columns::{self, Column};
 use simulation::record::{ColumnNames, Format, MeasuredRecord, Record, columns_file, remarks_on};
@@ -61,7 +61,8 @@ impl Options {
             None => format.open(Path::new(name)),
             Some(columns) => {
                 let mut format = format.clone();
-                format.dialect.separator = Some(",".parse()?);
+                format.dialect.separator = Some(Separator::COMMA);
+                format.dialect.decimal = format.dialect.decimal.filter(|_| columns.iter().any(has_decimal_commas));
                 format.read(Source::new(name, columns::text(name, columns)?))
             }
         };
@@ -90,6 +91,11 @@ impl Options {
         let input = self.input.or(named).map(|name| name.parse()).transpose()?;
         Ok((given.or(in_file), input.unwrap_or_default()))
     }
+}
+
+/// True for a column of texts with commas. Others hold numbers, which have no decimal mark, or time stamps.
+fn has_decimal_commas((_, column): &(String, Column)) -> bool {
+    matches!(column, Column::Texts(cells) if cells.iter().any(|cell| cell.contains(',')))
 }
 
 impl Records {

@@ -1,9 +1,10 @@
 """Identification, diagnosis and plan compared with the command's JSON."""
 
 import json
+import re
 import threading
 import time
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, replace
 
 import numpy as np
 import pandas
@@ -12,6 +13,7 @@ import pytest
 
 import vsj
 from conftest import SAMPLE
+from vsj.answers import RecordReport
 
 
 def without_names(answer):
@@ -120,6 +122,41 @@ def test_several_records_are_of_one_spring(command, sample):
     found = vsj.diagnose([sample, sample], effort="quick")
     assert [name for name, _ in found.courses] == ["columns 1", "columns 2"]
     assert len(found.courses_frame()) == 2 * len(sample["time_s"]) and len(found.records) == 2
+
+
+def test_a_prompt_shows_a_line_and_a_notebook_a_table(command, diagnosis):
+    assert re.fullmatch(r"<vsj\.Diagnosis explained: hysteresis \((1\.000|0\.9\d\d)\); 2401 rows>", repr(diagnosis))
+    said = command("diagnose", SAMPLE, "--effort", "quick")
+    html = diagnosis._repr_html_()
+    [probability, size] = re.search(r"^hysteresis +(\S+) +(width_v = .*)$", said, re.M).groups()
+    assert f"<tr><td>hysteresis</td><td>{probability}</td><td>{size}</td></tr>" in html and "<b>explained</b>" in html
+    [before, after] = re.search(r"held-out error decreases from (\S+) to (\S+) V", said).groups()
+    assert f"Held-out error {before} without the causes, {after} with them." in html
+    assert len(html) < 2000
+
+    found = vsj.identify(SAMPLE)
+    assert repr(found).startswith("<vsj.Identified gain ") and len(repr(found)) < 200
+    value, unit, interval = re.search(r"^gain +(\S+) (\S+) +(\[.*?\])", command("identify", SAMPLE), re.M).groups()
+    assert f"gain {value} {interval} {unit}, time constants" in repr(found)
+    assert re.fullmatch(r"<vsj\.Plan 2 minutes.*>", repr(vsj.plan(diagnosis, minutes=2)))
+
+
+def test_a_table_shows_what_is_open_and_no_name_gets_through(diagnosis):
+    finding = replace(diagnosis.findings[0], cause="<b>")
+    record = RecordReport("<i>.csv", 9, 0.0, 1.0, 1.0, "explained", [finding], None)
+    open_ = dict(complete=False, alternatives=[[], ["drift", "hum"]], next_experiment="hold 300 V", leftover="Structure & more")
+    html = replace(diagnosis, verdict="ambiguous", findings=[], records=[record], **open_)._repr_html_()
+    for part in (
+        "<b>ambiguous</b>",
+        "&lt;b&gt; in &lt;i&gt;.csv only",
+        "The search was stopped",
+        "cannot reject: no error at all; drift with hum.",
+        "To decide, hold 300 V.",
+        "Structure &amp; more.",
+    ):
+        assert part in html
+    nothing = replace(diagnosis, verdict="consistent", findings=[])
+    assert repr(nothing) == "<vsj.Diagnosis consistent; 2401 rows>" and "<table" not in nothing._repr_html_()
 
 
 def test_errors_have_the_text_of_the_command(command, sample, tmp_path):

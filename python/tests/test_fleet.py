@@ -334,6 +334,31 @@ def test_parquet_records_and_a_parquet_manifest_have_the_same_answers(copied, tm
         assert row["rmse"] == pytest.approx(expected.baseline.rmse, rel=1e-9)
 
 
+@pytest.mark.parametrize("where", ["options", "file"])
+def test_separator_and_decimal_mark_are_those_of_the_csv_files(copied, tmp_path, engine, where):
+    """One fleet may hold files of both kinds."""
+    *texts, table = sorted(copied.glob("*/*.csv"))
+    expected = {it: vsj.diagnose(it).baseline.rmse for it in (*texts, table)}
+    for path in texts:
+        pandas.read_csv(path).to_csv(path, index=False, sep=";", decimal=",")
+    frame = pandas.read_csv(table)
+    # Time stamps are texts on their way to the reader.
+    frame["time_s"] = pandas.Timestamp("2026-03-01") + pandas.to_timedelta(frame["time_s"], unit="s")
+    frame.rename(columns={"time_s": "time"}).to_parquet(table.with_suffix(".parquet"))
+    table.unlink()
+    options = ["--separator", ";", "--decimal", ","]
+    if where == "file":
+        (tmp_path / "columns.toml").write_text('[columns]\nseparator = ";"\ndecimal = ","\n')
+        options = ["--columns", str(tmp_path / "columns.toml")]
+    out = tmp_path / "out"
+    assert fleet.main([str(copied), "--out", str(out), "--scheduler", engine, *options]) == 0
+    rows = rows_of(out)
+    assert len(rows) == len(expected)
+    for path, rmse in expected.items():
+        record = path.with_suffix(".parquet") if path == table else path
+        assert rows[str(record.relative_to(copied))]["rmse"] == pytest.approx(rmse, rel=1e-9)
+
+
 def test_records_and_results_may_be_in_an_object_store(copied, engine):
     import fsspec
 

@@ -4,6 +4,8 @@ import json
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Dict, List, Optional, Union, get_args, get_origin, get_type_hints
 
+from . import display
+
 _HINTS = {}
 
 
@@ -333,6 +335,9 @@ class Identified(Answer):
     plant: str = field(init=False, repr=False, compare=False)
     courses: list = field(init=False, repr=False, compare=False)
 
+    def __repr__(self):
+        return display.identified_line(self)
+
     def to_frame(self):
         """A pandas DataFrame with one row per quantity: ``quantity``, ``value``, ``low``, ``high``, ``unit``."""
         import pandas
@@ -391,6 +396,12 @@ class Diagnosis(Answer):
     plant: str = field(init=False, repr=False, compare=False)
     courses: list = field(init=False, repr=False, compare=False)
 
+    def __repr__(self):
+        return display.diagnosis_line(self)
+
+    def _repr_html_(self):
+        return display.diagnosis_html(self)
+
     def to_frame(self):
         """A pandas DataFrame with one row per parameter of each finding: ``cause``, ``probability``, ``parameter``, ``value``,
         ``low``, ``high``, ``unit``, ``rmse_before``, ``rmse_after``."""
@@ -433,6 +444,9 @@ class Plan(Answer):
     intervals: List[Sharper]
     remarks: List[str]
     course: dict = field(init=False, repr=False, compare=False)
+
+    def __repr__(self):
+        return display.plan_line(self)
 
     def to_frame(self):
         """The schedule as a pandas DataFrame with the columns ``time_s`` and ``voltage_v``."""

@@ -43,6 +43,7 @@ pub mod sampled;
 pub mod schedule;
 pub mod settings_file;
 pub mod spring_error;
+#[cfg(not(target_family = "wasm"))]
 pub mod tune;
 pub mod units;
 

@@ -118,8 +118,8 @@ fn without_a_command_it_writes_the_stair_experiment_and_prints_the_paths() {
         assert!((modulus - (1.301e9 + 1.069e6 * stiffness)).abs() < 2.0);
     }
     assert_eq!(ticks[20_100][..2], [20.1, 100.0]);
-    for (name, words) in [("stiffness.svg", ["measured", "without controller"]), ("voltage.svg", ["applied", "target"])]
-    {
+    let stiffness = ["measured", "without controller", ">equivalent static voltage [V]<"];
+    for (name, words) in [("stiffness.svg", stiffness), ("voltage.svg", ["applied", "target", ">voltage [V]<"])] {
         let svg = fs::read_to_string(folder.path().join("out/stair").join(name)).unwrap();
         assert!(svg.contains("<svg") && words.iter().all(|word| svg.contains(word)));
     }

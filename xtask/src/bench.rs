@@ -137,7 +137,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// The table of the closed loop.
 fn closed_loop(python: &Path, target: &Path) -> Result<Vec<Row>> {
-    package::install(python, target)?;
+    package::install(python, target, package::RELEASE)?;
     shell::run(cargo_bench().arg("--no-run"))?;
     let in_c = in_c(target)?;
     let mut rounds = Vec::new();

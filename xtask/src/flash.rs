@@ -15,6 +15,8 @@ const HELP: &str = "probe-rs flashes the board; it is installed by `cargo instal
 
 /// Builds the board's image and hands it to `probe-rs run`.
 pub(crate) fn run(variant: Variant) -> Result<()> {
+    // Before the image is built, which takes minutes.
+    shell::output(shell::command("probe-rs").arg("--version")).context(HELP)?;
     let elf = build::image_with(&variant.features(), Board::Nucleo, Opt::S)?;
     shell::run(shell::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf)).context(HELP)
 }

@@ -16,7 +16,14 @@ pub(crate) struct Args {
     /// One part alone
     #[arg(long, value_enum, value_name = "PART")]
     only: Option<Part>,
+
+    /// Profile in which cargo builds the package
+    #[arg(long, value_name = "PROFILE", default_value = RELEASE)]
+    profile: String,
 }
+
+/// The profile that users install.
+pub(crate) const RELEASE: &str = "release";
 
 /// A part of the command.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -33,7 +40,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let python = python::environment(&target, "python", REQUIREMENTS)?;
     if args.only != Some(Part::Test) {
         shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
-        install(&python, &target)?;
+        install(&python, &target, &args.profile)?;
     }
     if args.only != Some(Part::Install) {
         let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
@@ -43,11 +50,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Installs the package in the virtual environment of an interpreter, which has maturin.
-pub(crate) fn install(python: &Path, target: &Path) -> Result<()> {
+pub(crate) fn install(python: &Path, target: &Path, profile: &str) -> Result<()> {
     // In the same folder, so that what the package and the command depend on is built once.
     let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
     let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
-    shell::run(shell::command(python).args(install).env("CARGO_TARGET_DIR", target).env("PATH", path))
+    let profile = format!("--profile {profile}");
+    let mut command = shell::command(python);
+    command.args(install).env("MATURIN_PEP517_ARGS", profile).env("CARGO_TARGET_DIR", target).env("PATH", path);
+    shell::run(&mut command)
 }
 
 /// The search path with a folder in front.

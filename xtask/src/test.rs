@@ -6,6 +6,7 @@ use std::{env, fs, io};
 use anyhow::{Context, Result};
 use xtask::{setup, shell};
 
+use crate::page;
 use crate::steps::{self, Lanes, Progress, Step};
 
 /// What a slip of the hand breaks.
@@ -30,7 +31,10 @@ const LANES: Lanes = Lanes {
         Step::new("lint mps2", &lint("-ptest-bench", "mps2-an386")),
         Step::new("all mps2", &lint("-ptest-bench", "mps2-an386,fast,robust,adaptation,kilovolt")),
         Step::xtask("prove", &["prove", "--ticks", "1000000"]),
-        Step::xtask("package", &["python", "--only", "install"]),
+        // Of the page only this is compiled here: what is left out for a browser must not be missed there.
+        Step::new("lint page", &["clippy", "--quiet", "-ppage", "--lib", "--target", page::WASM, "--", "-Dwarnings"]),
+        // In the profile of `build`, whose dependencies it takes.
+        Step::xtask("package", &["python", "--only", "install", "--profile", "dev"]),
     ],
     built: &[
         Step::new(
@@ -100,6 +104,7 @@ pub(crate) fn run() -> Result<()> {
     let progress = Progress::of(1 + FIRST.len() + LANES.count());
     progress.begin("setup");
     setup::run()?;
+    setup::target(page::WASM)?;
     forget_packages()?;
     for step in FIRST {
         progress.begin(step.name);

@@ -17,7 +17,7 @@ pub fn stiffness<P>(experiment: &Experiment<P>, run: &Run, report: &stair::Repor
     if !measured.is_empty() {
         series.push(Series::new("measured", READING, Shape::Discs(3.5), measured));
     }
-    Chart::new("Stiffness of the spring", "time [s]", "scaled stiffness [V]", series).file()
+    Chart::new("Stiffness of the spring", "time [s]", "equivalent static voltage [V]", series).file()
 }
 
 /// Target and the voltage put across the spring.

@@ -10,7 +10,7 @@
 
 use simulation::units::Units;
 
-use crate::dimension::{self, Dimension};
+use crate::dimension::{self, Dimension, significant};
 
 /// The reference time constant, in normalised seconds.
 pub const REFERENCE_TIME_CONSTANT_S: f64 = 5.5;
@@ -89,6 +89,12 @@ impl Scales {
         format!("{} {}", self.number(dimension, restored, decimals), self.unit(dimension)).trim_end().to_owned()
     }
 
+    /// Returns a number of the file with four significant digits and the user's unit.
+    pub fn four_digits(&self, dimension: Dimension, restored: f64) -> String {
+        let shown = restored / dimension.size_of_shown_unit(&self.units);
+        format!("{} {}", significant(shown, 4), self.unit(dimension)).trim_end().to_owned()
+    }
+
     /// Returns a normalised number with the user's unit, with `decimals` decimals where that has the size of the normalised one.
     pub fn shown(&self, dimension: Dimension, normalised: f64, decimals: usize) -> String {
         self.with_unit(dimension, self.restored(dimension, normalised), decimals)
@@ -118,6 +124,8 @@ mod tests {
         assert_eq!(scales.shown(Dimension::Voltage, 500.0, 0), "5.00 kV");
         assert_eq!(scales.shown(Dimension::Reading, 500.0, 0), "4.9500 mm");
         assert_eq!(scales.shown(Dimension::ReadingSize, 2.0, 3), "0.0002000 mm");
+        assert_eq!(scales.four_digits(Dimension::ReadingSize, 698.997_17), "699.0 mm");
+        assert_eq!(scales.four_digits(Dimension::Time, 2.0), "2000 ms");
         assert_eq!(scales.restored(Dimension::Frequency, 2.0), 2000.0);
     }
 }

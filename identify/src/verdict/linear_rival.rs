@@ -41,7 +41,7 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
         return;
     }
     let shown = |errors: &[f64]| {
-        diagnosis.data.normalisation.scales.with_unit(Dimension::ReadingSize, root_mean_square(errors), 3)
+        diagnosis.data.normalisation.scales.four_digits(Dimension::ReadingSize, root_mean_square(errors))
     };
     if report.verdict != Verdict::Unexplained {
         let beyond = root_mean_square(&ours).powi(2) - root_mean_square(&theirs).powi(2);

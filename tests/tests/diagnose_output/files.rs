@@ -160,6 +160,8 @@ fn a_short_record_is_drawn_as_the_points_that_it_is() {
     let drawn = |name: &str, what: &str| {
         fs::read_to_string(folder.path().join("out").join(name)).expect("a plot").matches(what).count()
     };
+    // Whatever the reading is: only its unit is known.
+    assert_eq!(drawn("readings.svg", ">voltage, reading [V]<"), 1);
     // Readings, the simulation, and two dots in the legend; the grid, the axes and the command are lines.
     assert_eq!((drawn("readings.svg", "<circle"), drawn("readings.svg", "<path")), (2 * 17 + 2, 3));
     // The last row is 16 rows after the first.

@@ -17,7 +17,7 @@ use xtask::{build, files, setup, shell};
 use bundle::bundle;
 
 /// Target triple of WebAssembly.
-const WASM: &str = "wasm32-unknown-unknown";
+pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 /// Sources of the page.
 const WEB: &str = "page/web";
 /// Style sheets in their order: those of the report pages and plots, then the page's own.

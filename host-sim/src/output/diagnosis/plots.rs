@@ -40,7 +40,7 @@ fn in_volts(data: &Data) -> bool {
 
 fn readings_label(data: &Data) -> String {
     let unit = data.scales().unit(Dimension::Reading);
-    if in_volts(data) { format!("voltage, scaled stiffness [{unit}]") } else { format!("reading [{unit}]") }
+    if in_volts(data) { format!("voltage, reading [{unit}]") } else { format!("reading [{unit}]") }
 }
 
 fn difference_label(data: &Data) -> String {

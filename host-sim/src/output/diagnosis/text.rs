@@ -10,7 +10,7 @@ use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
 use crate::output::diagnosis::equation;
-use crate::output::diagnosis::number::{interval, linear_name, shown_name};
+use crate::output::diagnosis::number::{interval, linear_name, number, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 
@@ -49,8 +49,11 @@ pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
         (error("one-step"), before.one_step_rmse, after.one_step_rmse, None),
         ("fit [%]".to_owned(), before.fit_percent, after.fit_percent, None),
     ] {
-        let dimension = if what == "fit [%]" { Dimension::Ratio } else { Dimension::ReadingSize };
-        let number = |value: f64| if value.is_finite() { scales.number(dimension, value, 3) } else { "-".into() };
+        let number = |value: f64| match value.is_finite() {
+            true if what == "fit [%]" => format!("{value:.3}"),
+            true => number(value),
+            false => "-".into(),
+        };
         let after = if extends { format!(" {:>12}", number(after)) } else { String::new() };
         let linear = linear.map_or_else(String::new, |linear| format!(" {:>16}", number(linear)));
         let _ = writeln!(text, "{what:22} {:>12}{after}{linear}", number(before));
@@ -141,8 +144,8 @@ fn parts_to_take_out(report: &answer::Report, scales: &Scales) -> Option<String>
             "The plant file's {} {are} not in this spring: take {them} out. The held-out error decreases \
              from {} to {} without {them}{}.",
             parts.join(" and "),
-            scales.number(Dimension::ReadingSize, before.held_out_rmse, 3),
-            scales.with_unit(Dimension::ReadingSize, after.held_out_rmse, 3),
+            number(before.held_out_rmse),
+            scales.four_digits(Dimension::ReadingSize, after.held_out_rmse),
             if report.findings.is_empty() { "" } else { " and with the causes below" }
         )
     })
@@ -177,7 +180,7 @@ fn off_by(part: f64) -> String {
 
 /// States which nominal spring is judged.
 pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
-    let taus: Vec<String> = nominal.tau_s.iter().map(|&tau_s| four_digits(Dimension::Time, tau_s, scales)).collect();
+    let taus: Vec<String> = nominal.tau_s.iter().map(|&tau_s| scales.four_digits(Dimension::Time, tau_s)).collect();
     let reading = match (nominal.gain, nominal.zero) {
         (1.0, 0.0) => String::new(),
         (gain, zero) => {
@@ -186,7 +189,7 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
             format!(
                 ", gain {} {unit}, zero {}",
                 significant(gain * per, 4),
-                four_digits(Dimension::Reading, zero, scales)
+                scales.four_digits(Dimension::Reading, zero)
             )
         }
     };
@@ -198,15 +201,8 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
     )
 }
 
-/// A number of the file in the user's unit with four significant digits.
-fn four_digits(dimension: Dimension, restored: f64, scales: &Scales) -> String {
-    let shown = restored / dimension.size_of_shown_unit(&scales.units);
-    format!("{} {}", significant(shown, 4), scales.unit(dimension)).trim_end().to_owned()
-}
-
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
 pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<String> {
-    let error = |value| scales.number(Dimension::ReadingSize, value, 3);
     let unit = scales.unit(Dimension::ReadingSize);
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
     let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
@@ -259,19 +255,19 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         sentences.push(if report.extended.gain > SMALLEST_IMPROVEMENT {
             format!(
                 "With {it} in the model, the held-out error decreases from {} to {} {unit}, by {:.1} %.",
-                error(before.held_out_rmse),
-                error(after.held_out_rmse),
+                number(before.held_out_rmse),
+                number(after.held_out_rmse),
                 100.0 * report.extended.gain
             )
         } else if after.rmse > (1.0 - SMALLEST_IMPROVEMENT) * before.rmse {
             let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is noise of the readings" };
-            format!("With {it} in the model, the error stays at {} {unit}{whose}.", error(after.rmse))
+            format!("With {it} in the model, the error stays at {} {unit}{whose}.", number(after.rmse))
         } else {
             format!(
                 "With {it} in the model, the error decreases from {} to {} {unit}, but the held-out error does not: the \
                  other parts of the record do not predict it.",
-                error(before.rmse),
-                error(after.rmse)
+                number(before.rmse),
+                number(after.rmse)
             )
         });
     }
@@ -285,8 +281,8 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         sentences.push(format!(
             "The best suspect is {}, {distance}: it changes the error from {} to {} {unit}.",
             suspect.cause,
-            error(suspect.rmse_before),
-            error(suspect.rmse_after)
+            number(suspect.rmse_before),
+            number(suspect.rmse_after)
         ));
     }
     if !report.alternatives.is_empty() {
@@ -307,8 +303,8 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         sentences.push(format!(
             "The noise is autocorrelated: {} {unit} in free run, {} {unit} in one step. A slow effect of the spring \
              could be mistaken for it.",
-            error(rmse),
-            error(one_step_rmse)
+            number(rmse),
+            number(one_step_rmse)
         ));
     }
     if let Some(leftover) = &report.leftover {
@@ -337,6 +333,7 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
 mod tests {
     use super::*;
     use identify::answer::{NoiseReport, ResidualReport, SCHEMA};
+    use simulation::units::Units;
 
     /// The first two sentences about causes that do not reduce the error.
     fn said(verdict: Verdict, causes: &[&'static str], alternatives: &[Vec<&'static str>]) -> String {
@@ -424,8 +421,22 @@ mod tests {
             judge: answer::Judge::LeaveOneOut,
             probability: None,
         });
-        let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.675 to 20.029 V.";
+        let said = "The best suspect is reading-offset, 4.5 nats short of a finding: it changes the error from 42.67 to 20.03 V.";
         assert_eq!(sentences("r.csv", &report, &Scales::default())[1], said);
+    }
+
+    /// However small the normalised unit is, or the error beside the record's readings.
+    #[test]
+    fn errors_have_four_digits_in_any_unit() {
+        let mut report = report(Verdict::Explained, &["hysteresis"], &[]);
+        report.baseline.held_out_rmse = 698.997_17;
+        report.extended.quality.held_out_rmse = 0.078_64;
+        report.extended.gain = 0.9999;
+        let units = Units { reading: "mm".into(), ..Units::default() };
+        let scales = Scales { reading: 0.01, units, ..Scales::default() };
+        let said = "With it in the model, the held-out error decreases from 699.0 to 0.07864 mm, by 100.0 %.";
+        assert_eq!(sentences("r.csv", &report, &scales)[1], said);
+        assert!(text("r.csv", &report, &scales).contains("held-out RMSE [mm]            699.0      0.07864\n"));
     }
 
     #[test]
