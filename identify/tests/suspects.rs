@@ -73,7 +73,8 @@ fn ranking_and_evidence_agree_on_the_best_without_a_cause() {
     let [without] = without.as_slice() else { panic!("{ranking:?}") };
     assert!(!without.causes.contains(&"static-nonlinearity"), "{without:?}");
     let evidence = &report.findings[0].evidence;
-    let said = format!("{:.3} V)", without.rmse);
+    // Four digits, as in every sentence.
+    let said = format!("{:.2} V)", without.rmse);
     assert!(
         evidence.contains(&said) && without.causes.iter().all(|cause| evidence.contains(cause)),
         "{said}: {evidence}"
