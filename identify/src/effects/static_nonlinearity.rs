@@ -54,6 +54,8 @@ const FORMS: [(Curve, bool); 11] = [
 
 /// Smallest `x` of a power, which may have no finite slope at 0.
 const LEAST_OF_POWER: f64 = 1e-9;
+/// Smallest `s(X)` of a kink: a dead band that ends beyond the reference voltage has no gain there.
+const LEAST_OF_KINK: f64 = 1e-3;
 /// Places of a kink, and slopes below it relative to that above, at initial points.
 const INITIAL_KINKS: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.7];
 const INITIAL_SLOPES: [f64; 2] = [0.5, 1.5];
@@ -80,7 +82,7 @@ impl Curve {
             Kink => {
                 let [place, slope] = [point[0], point[1]];
                 let secant = |x: f64| if x < place { slope } else { 1.0 + (slope - 1.0) * place / x };
-                secant(x) / secant(fixed)
+                secant(x) / secant(fixed).max(LEAST_OF_KINK)
             }
             Polynomial(_) | Uneven => {
                 let polynomial = |x: f64| x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient);

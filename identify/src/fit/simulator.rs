@@ -251,7 +251,8 @@ impl<'a> Simulator<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::index_of;
+    use crate::effects::effect::Coordinate;
+    use crate::effects::{EFFECTS, index_of};
     use crate::record::input::Input;
     use simulation::record::Record;
 
@@ -294,5 +295,35 @@ mod tests {
                 assert_eq!(got, expected, "{model:?} after {first:?}");
             }
         }
+    }
+
+    /// A fit may go to every corner of its bounds: the prediction there is finite, also beyond the nominal spring's reference
+    /// voltage and for voltages of both signs.
+    #[test]
+    fn prediction_is_finite_at_every_corner_of_the_bounds() {
+        let rows = (0..60).map(|row| format!("{row},{},{}\n", [0, 300, -400, 900][row / 8 % 4], row % 7));
+        let text = format!("time_s,voltage_v,stiffness\n{}", rows.collect::<String>());
+        let (data, base) = (Data::new(&Record::parse("r", &text, "stiffness").unwrap(), Input::Hold), Base::paper());
+        // Of a block with more coordinates not every corner.
+        const MOST: usize = 8;
+        let mut corners = 0;
+        for (effect, of) in EFFECTS.iter().enumerate() {
+            for form in 0..of.forms() {
+                let bounds = of.coordinates(form, &data);
+                for corner in 0..1 << bounds.len().min(MOST) {
+                    let end = |(index, bound): (usize, &Coordinate)| match corner >> (index % MOST) & 1 {
+                        0 => bound.lowest,
+                        _ => bound.highest,
+                    };
+                    let point: Vec<f64> = bounds.iter().enumerate().map(end).collect();
+                    let mut readings = Vec::new();
+                    let model = Model::default().with(Block { effect, form }, point);
+                    Simulator::new(&data, &base).run(&model, &mut readings);
+                    assert!(readings.iter().all(|reading| reading.is_finite()), "{model:?}: {readings:?}");
+                    corners += 1;
+                }
+            }
+        }
+        assert!(corners > 100, "{corners}");
     }
 }

@@ -118,8 +118,12 @@ impl PlayBank {
         bank
     }
 
-    /// Returns the output when the input moves monotonically to `voltage`, both in V.
+    /// Returns the output when the input moves monotonically to `voltage`, both in V; NaN for NaN, which a model whose numbers
+    /// overflow may have.
     pub fn at(&mut self, voltage: f64) -> f64 {
+        if voltage.is_nan() {
+            return voltage;
+        }
         let mut sum = self.direct * voltage - self.zero;
         for play in &mut self.plays {
             play.value = play.value.clamp(voltage - play.threshold, voltage + play.threshold);
@@ -183,6 +187,13 @@ fn line_at(lines: &[Line], at: f64) -> Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_number_has_no_output() {
+        let mut bank = PlayBank::new(0.5, [(10.0, 0.5)]);
+        assert!(bank.at(f64::NAN).is_nan());
+        assert_eq!(bank.at(20.0), 0.5 * 20.0 + 0.5 * 10.0);
+    }
 
     /// A play of weight 1 lags by its threshold on both branches.
     #[test]
