@@ -1,6 +1,7 @@
 //! What a report shows of causes that are no findings: suspects, and the best explanations without each finding.
 
 use identify::answer::Judge;
+use identify::dimension::significant;
 use identify::{Diagnosis, Options, Report, Verdict, examine};
 use simulation::record::{Record, Row};
 
@@ -73,8 +74,7 @@ fn ranking_and_evidence_agree_on_the_best_without_a_cause() {
     let [without] = without.as_slice() else { panic!("{ranking:?}") };
     assert!(!without.causes.contains(&"static-nonlinearity"), "{without:?}");
     let evidence = &report.findings[0].evidence;
-    // Four digits, as in every sentence.
-    let said = format!("{:.2} V)", without.rmse);
+    let said = format!("{} V)", significant(without.rmse, 4));
     assert!(
         evidence.contains(&said) && without.causes.iter().all(|cause| evidence.contains(cause)),
         "{said}: {evidence}"

@@ -100,12 +100,9 @@ impl<'a> Problem<'a> {
         let even = |row: usize| residual[row] * weights.map_or(1.0, |weights| weights[row]);
         let errors: Vec<f64> = (0..residual.len()).filter(|&row| used[row]).map(even).collect();
         let law = Noise::robust(&errors);
-        let constant = errors.len() as f64 * law.log_density(Reading::Exact, 0.0, 0.0);
-        let narrow = 1.0 / (law.nu * law.sigma * law.sigma);
-        let factor = |e: &f64| (1.0 + e * e * narrow).min(1e38);
-        let logs: f64 = errors.chunks(8).map(|chunk| chunk.iter().map(factor).product::<f64>().ln()).sum();
         self.budget.spend(WORK_OF_LIKELIHOOD * residual.len() as u64);
-        (law.clone(), constant - 0.5 * (law.nu + 1.0) * logs)
+        let log_likelihood = law.exact_log_likelihood(&errors);
+        (law, log_likelihood)
     }
 
     /// Returns the weights of the rows in a least-squares step around a residual, in 1/V^2; 0 for rows that are not used.

@@ -263,7 +263,7 @@ impl<'a> Engine<'a> {
         self.levenberg_marquardt(model, law, known, EARLY_ROUNDS)
     }
 
-    /// Goes on from there.
+    /// Continues a fit that was [approached](Engine::approached), unless a further round would gain nothing.
     pub fn approach_further(&mut self, approach: &mut Approach, law: &Noise, known: &Known) {
         if !approach.settled {
             *approach = self.levenberg_marquardt(approach.model.clone(), law, known, FIRST_ROUNDS - EARLY_ROUNDS);

@@ -161,10 +161,14 @@ impl Noise {
         if self.half_step > 0.0 || self.outliers.is_some() {
             return rows().map(log).sum();
         }
-        let at_bounds = || rows().filter(|(_, kind)| **kind != Kind::Exact).map(log).sum();
-        let at_bounds: f64 = if observed.all_exact() { 0.0 } else { at_bounds() };
-        let white = &*observed.uncensored(white);
-        let constant = at_bounds + white.len() as f64 * self.constant;
+        let at_bounds: f64 = rows().filter(|(_, kind)| **kind != Kind::Exact).map(log).sum();
+        at_bounds + self.exact_log_likelihood(&observed.uncensored(white))
+    }
+
+    /// Returns the log-likelihood of innovations, in V, of readings that are not known up to an interval only, without outliers, in
+    /// nats.
+    pub fn exact_log_likelihood(&self, white: &[f64]) -> f64 {
+        let constant = white.len() as f64 * self.constant;
         let variance = self.sigma * self.sigma;
         if self.nu.is_infinite() {
             return constant - 0.5 * dot(white, white) / variance;

@@ -95,6 +95,11 @@ impl Scales {
         format!("{} {}", significant(shown, 4), self.unit(dimension)).trim_end().to_owned()
     }
 
+    /// Returns a normalised number with four significant digits and the user's unit.
+    pub fn shown_in_four_digits(&self, dimension: Dimension, normalised: f64) -> String {
+        self.four_digits(dimension, self.restored(dimension, normalised))
+    }
+
     /// Returns a normalised number with the user's unit, with `decimals` decimals where that has the size of the normalised one.
     pub fn shown(&self, dimension: Dimension, normalised: f64, decimals: usize) -> String {
         self.with_unit(dimension, self.restored(dimension, normalised), decimals)

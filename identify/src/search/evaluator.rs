@@ -6,7 +6,7 @@ use crate::effects::effect::{Effect, FitContext};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
-use crate::search::first_fits::first_fits;
+use crate::search::first_fits::{Start, first_fits};
 use crate::search::initial_models::initial_models;
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
@@ -128,7 +128,9 @@ impl Evaluator for Engine<'_> {
             extensions
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
-        first_fits(self, fit, &law, extensions.into_iter().map(|it| (it.block, it.point)))
+        let start = |Extension { block, point, .. }| Start { price: Evaluator::price(self, &block), block, point };
+        let starts = extensions.into_iter().map(start).collect();
+        first_fits(self, fit, &law, starts)
     }
 
     fn extended_by(&mut self, fit: &Fit, effect: usize) -> Option<Fit> {

@@ -250,7 +250,7 @@ const UNEARNED: &str =
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {
-    let rms = scales.four_digits(Dimension::ReadingSize, scales.restored(Dimension::ReadingSize, *rms));
+    let rms = scales.shown_in_four_digits(Dimension::ReadingSize, *rms);
     format!("{:.1} % of the residual ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
 }
 

@@ -41,9 +41,7 @@ pub(crate) fn spoiling(engine: &mut Engine, found: &Found) -> Vec<Spoils> {
 impl Spoils {
     /// The report's sentence on what the simulation leaves.
     pub(crate) fn sentence(&self, scales: &Scales) -> String {
-        let [with, without] = self
-            .errors
-            .map(|error| scales.four_digits(Dimension::ReadingSize, scales.restored(Dimension::ReadingSize, error)));
+        let [with, without] = self.errors.map(|error| scales.shown_in_four_digits(Dimension::ReadingSize, error));
         format!(
             "Fitted to the first 60 % of the record, the simulation predicts the rest worse with {} than without it, {with} \
              instead of {without}",

@@ -25,8 +25,7 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, explored: &Explored, c
     let (data, observed) = (engine.data, engine.observed);
     let [before, rival, after] = [left_out, without, best].map(|scored| rms(observed, &scored.fit.residual));
     let others = named(&without.fit.model);
-    let scales = data.scales();
-    let rival = scales.four_digits(Dimension::ReadingSize, scales.restored(Dimension::ReadingSize, rival));
+    let rival = data.scales().shown_in_four_digits(Dimension::ReadingSize, rival);
     let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others };
     let better = if best.fit.model.searched(effect) {
         format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")

@@ -18,6 +18,11 @@ fn next(bits: &mut u32) -> u32 {
     *bits
 }
 
+/// Returns a digest continued over further values: the FNV-1a hash, a value at a time.
+fn continued(digest: u64, values: &[i64]) -> u64 {
+    values.iter().fold(digest, |digest, &value| (digest ^ value as u64).wrapping_mul(0x0100_0000_01b3))
+}
+
 #[test]
 fn a_setting_out_of_range_is_rejected_by_name() {
     let time = SampleTime::from_rate(1000.0).unwrap();
@@ -203,7 +208,7 @@ fn every_tick_is_the_same_to_the_bit() {
                 state.acknowledge();
             }
             let Report { verdict, since_blocks, size, energies } = state.report();
-            for value in [
+            let values = [
                 i64::from(verdict.code()),
                 i64::from(since_blocks),
                 i64::from(size.numerator),
@@ -212,9 +217,8 @@ fn every_tick_is_the_same_to_the_bit() {
                 energies.1,
                 i64::from(state.decisions()),
                 i64::from(state.mean_voltage().0.to_bits()),
-            ] {
-                all = (all ^ value as u64).wrapping_mul(0x0100_0000_01b3);
-            }
+            ];
+            all = continued(all, &values);
         }
         assert_eq!(all, digest, "{rate_hz} Hz: {all:#x}");
     }

@@ -116,7 +116,7 @@ fn watched(faulty: &Spring) -> (Verdict, f64, u64) {
         if state.decisions() != decisions {
             decisions = state.decisions();
             let Report { verdict, since_blocks, size, energies } = state.report();
-            for value in [
+            let values = [
                 i64::from(verdict.code()),
                 i64::from(since_blocks),
                 i64::from(size.numerator),
@@ -125,9 +125,8 @@ fn watched(faulty: &Spring) -> (Verdict, f64, u64) {
                 i64::from(size.scale),
                 energies.0,
                 energies.1,
-            ] {
-                digest = (digest ^ value as u64).wrapping_mul(0x0100_0000_01b3);
-            }
+            ];
+            digest = continued(digest, &values);
         }
     }
     let size = state.report().finding(&Settings::PAPER, 1000.0).map_or(0.0, |finding| finding.size);
