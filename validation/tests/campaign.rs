@@ -129,7 +129,8 @@ fn an_oracle_scores_100_percent_and_a_wrong_diagnosis_0() {
         Ok(json!({"schema": 1, "verdict": verdict, "findings": findings, "alternatives": [], "next_experiment": null,
             "extended": {"held_out_rmse": record.floor_rmse()}}))
     };
-    for jobs in [part::singles(1, 2), part::pairs(1, 1), part::triples(1, 10), part::nulls(1, 10)] {
+    let some_pairs = part::pairs(1, 1).into_iter().step_by(10).collect();
+    for jobs in [part::singles(1, 1), some_pairs, part::triples(1, 5), part::nulls(1, 5)] {
         let outcomes = part::run(&jobs, &oracle, &ProgressBar::hidden());
         assert_eq!(tables::wrong(&jobs, &outcomes), "");
         let summary = Summary::of("all", &outcomes.iter().collect::<Vec<_>>());
