@@ -220,6 +220,9 @@ pub struct Finding {
     pub rmse_after: f64,
     /// The evidence, in one sentence.
     pub evidence: String,
+    /// True if exact equality of readings proves the cause, whatever the law of the spring.
+    #[serde(skip)]
+    pub proved: bool,
 }
 
 impl Finding {

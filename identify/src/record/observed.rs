@@ -65,19 +65,22 @@ impl Observed {
                 _ => counts.push((value, 1)),
             }
         }
-        let inner: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
-        let grid = match inner.len() {
+        let distinct: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
+        let grid = match distinct.len() {
             0..=5 => None,
-            many => printed_grid(&inner[1..many - 1], data.scales()),
+            many => printed_grid(&distinct[1..many - 1], data.scales()),
         };
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
+        let inside = counts.get(1..counts.len().max(2) - 1).unwrap_or_default();
+        let most_repeated = inside.iter().map(|(_, count)| *count).max().unwrap_or(1);
         let scatter_v = scatter(&data.reading).max(FINEST_V.get());
         let far = CLOSE_TO_BOUND.get() * scatter_v;
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
             let (value, count) = *extreme?;
-            let piled = count >= FEWEST_TIES.count()
-                && (continuous || count >= BOUND_TO_NEXT_STEP.count() * next.map_or(1, |next| next.1));
+            // On a grid the next step is a fair judge; without one, any reading that is often the same.
+            let compared = if grid.is_some() { next.map_or(1, |next| next.1) } else { most_repeated };
+            let piled = count >= FEWEST_TIES.count() && (continuous || count >= BOUND_TO_NEXT_STEP.count() * compared);
             // A spring at rest reads exactly zero many times.
             (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
         };
@@ -209,4 +212,55 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
 /// Returns the scale of independent noise, in V; 0 if most readings repeat.
 fn scatter(reading: &[f64]) -> f64 {
     robust_deviation(second_differences(reading)).unwrap_or(f64::INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use simulation::record::{Record, Row};
+
+    use super::*;
+    use crate::record::input::Input;
+    use crate::stats::scale::normals;
+
+    /// Upper bound of readings of a stair of 0 to 400 V in 1200 rows with noise of 1 V, as a sensor takes them.
+    fn upper(sensor: impl Fn(Vec<f64>) -> Vec<f64>) -> Option<f64> {
+        upper_of(0, sensor)
+    }
+
+    /// The same with noise of another seed.
+    fn upper_of(seed: usize, sensor: impl Fn(Vec<f64>) -> Vec<f64>) -> Option<f64> {
+        let volts = |row: usize| 100.0 * (row / 120 % 5) as f64;
+        let noisy = normals(1200 * (seed + 1))[1200 * seed..]
+            .iter()
+            .enumerate()
+            .map(|(row, noise)| volts(row) + noise)
+            .collect();
+        let row =
+            |(row, reading)| Row { line: row, time_s: row as f64, voltage_v: volts(row), measured: Some(reading) };
+        let record = Record { name: String::new(), rows: sensor(noisy).into_iter().enumerate().map(row).collect() };
+        Observed::new(&Data::new(&record, Input::Hold)).upper
+    }
+
+    #[test]
+    fn readings_that_accumulate_at_the_extreme_alone_are_a_bound() {
+        let stopped = |read: Vec<f64>| read.into_iter().map(|reading| reading.min(350.0)).collect();
+        assert_eq!(upper(stopped), Some(350.0));
+        assert_eq!(upper(|read| read), None);
+        // A median of some readings is often the same reading as the one before, at the extreme as well.
+        let median = |length: usize, read: Vec<f64>| {
+            let of = |rows: &[f64]| {
+                let mut rows = rows.to_vec();
+                rows.sort_by(f64::total_cmp);
+                rows[rows.len() / 2]
+            };
+            (0..read.len()).map(|row| of(&read[(row + 1).saturating_sub(length)..=row])).collect::<Vec<_>>()
+        };
+        for (seed, length) in (0..20).flat_map(|seed| [9, 17, 25].map(|length| (seed, length))) {
+            assert_eq!(upper_of(seed, |read| median(length, read)), None, "{seed}, {length}");
+        }
+        assert_eq!(upper(|read| stopped(median(15, read))), Some(350.0));
+        // A counter of periods has steps that grow with the reading, and one code for the highest level.
+        let counted = |read: Vec<f64>| read.into_iter().map(|y| 3e4 / (3e4 / (y + 200.0)).round() - 200.0).collect();
+        assert_eq!(upper(counted), None);
+    }
 }

@@ -18,7 +18,7 @@
 //! ```
 //!
 //! and what is then less likely true than untrue is a suspect, no finding. In other records what is improbable beside a likely finding
-//! is a suspect; what is less likely true than untrue makes the record ambiguous: a law that no cause describes may be in its place.
+//! is a suspect; what else is less likely true than untrue makes the record ambiguous: a law that no cause describes may be in its place.
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
 use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
@@ -28,9 +28,6 @@ use crate::verdict::finding::explained;
 /// Probability below which nothing is a finding beside a likely one.
 const IMPROBABLE: f64 = 0.1;
 
-/// Causes that exact equality of readings proves.
-const EXACT: [&str; 2] = ["quantisation", "sensor-saturation"];
-
 /// Causes that do not respond to the voltage, so that they correct no law.
 const APART: [&str; 2] = ["hum", "outliers"];
 
@@ -39,14 +36,14 @@ pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
     let largest_but = |index: usize| {
         // What equality of readings proves follows no law that another cause could correct.
-        let corrected = |other: usize| other != index && !EXACT.contains(&findings[other].cause);
+        let corrected = |other: usize| other != index && !findings[other].proved;
         let others = removed.iter().enumerate().filter(|(other, _)| corrected(*other));
         others.map(|(_, removed)| *removed).fold(0.0, f64::max)
     };
     let own = |(index, finding): (usize, &Finding)| {
         let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
         let unknown = form + UNKNOWN_NOISE.get() * finding.rmse_after.powi(2);
-        if EXACT.contains(&finding.cause) { 1.0 } else { part(removed[index], unknown) }
+        if finding.proved { 1.0 } else { part(removed[index], unknown) }
     };
     let own: Vec<f64> = findings.iter().enumerate().map(own).collect();
     for (index, finding) in findings.iter_mut().enumerate() {
@@ -73,14 +70,17 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
 
 /// True if there are causes, not proved by exact equality of readings, and each is less likely true than untrue.
 pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
-    findings.iter().any(|finding| !EXACT.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
+    findings.iter().any(|finding| !finding.proved) && !findings.iter().any(is_likely_cause)
 }
 
-/// The causes that are at least as likely true as untrue, where another is less likely than that and not improbable; `None` elsewhere.
+/// The causes that are at least as likely true as untrue, where others are less likely than that, so that these may be all; empty if the
+/// simulation may be right as it is given, and `None` elsewhere. Improbable causes beside a likely one leave nothing open: they will be
+/// suspects.
 pub(crate) fn likely_alone(findings: &[Finding]) -> Option<Vec<&'static str>> {
-    let open = |finding: &Finding| !finding.is_likely() && finding.probability >= IMPROBABLE;
+    let beside_likely = findings.iter().any(is_likely_cause);
+    let open = |finding: &Finding| !finding.is_likely() && (!beside_likely || finding.probability >= IMPROBABLE);
     let likely = findings.iter().filter(|finding| finding.is_likely()).map(|finding| finding.cause);
-    (findings.iter().any(open) && findings.iter().any(is_likely_cause)).then(|| likely.collect())
+    findings.iter().any(open).then(|| likely.collect())
 }
 
 /// Makes suspects of findings: in a record with the verdict `unexplained` of those that are less likely true than untrue, in another of
@@ -98,7 +98,7 @@ pub(crate) fn unlikely_to_suspects(report: &mut Report) {
 
 /// True for a cause, not proved by exact equality of readings, that is at least as likely true as untrue.
 fn is_likely_cause(finding: &Finding) -> bool {
-    !EXACT.contains(&finding.cause) && finding.is_likely()
+    !finding.proved && finding.is_likely()
 }
 
 /// Takes unlikely findings out; returns them as suspects, the likeliest first.
@@ -125,7 +125,7 @@ fn part(removed: f64, unknown: f64) -> f64 {
 }
 
 fn lower(finding: &mut Finding, factor: f64) {
-    if !EXACT.contains(&finding.cause) {
+    if !finding.proved {
         finding.probability *= factor;
     }
 }
@@ -136,8 +136,8 @@ mod tests {
 
     /// A finding that removes errors down to 1 V.
     fn finding(cause: &'static str, before: f64) -> Finding {
-        let (parameters, evidence) = (Vec::new(), String::new());
-        Finding { cause, probability: 1.0, parameters, rmse_before: before, rmse_after: 1.0, evidence }
+        let (parameters, evidence, proved) = (Vec::new(), String::new(), cause == "quantisation");
+        Finding { cause, probability: 1.0, parameters, rmse_before: before, rmse_after: 1.0, evidence, proved }
     }
 
     fn probabilities(findings: &[Finding]) -> Vec<f64> {
@@ -178,7 +178,10 @@ mod tests {
         assert_eq!(likely_alone(&open), Some(vec!["hysteresis", "quantisation"]));
         assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.05)]), None, "a suspect");
         assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.6)]), None);
-        assert_eq!(likely_alone(&[probable("delay", 0.3), probable("quantisation", 1.0)]), None, "no likely cause");
+        let beside_proved = [probable("delay", 0.03), probable("quantisation", 1.0)];
+        assert_eq!(likely_alone(&beside_proved), Some(vec!["quantisation"]), "no likely cause but what is proved");
+        assert_eq!(likely_alone(&[probable("delay", 0.03)]), Some(Vec::new()));
+        assert_eq!(likely_alone(&[]), None);
     }
 
     #[test]

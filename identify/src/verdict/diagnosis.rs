@@ -126,7 +126,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         credibility::in_unexplained(&mut findings, share * after.rmse.powi(2));
     }
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
-    let alone = credibility::likely_alone(&findings);
+    let alone = credibility::likely_alone(&findings).filter(|alone| !found.rivals.contains(alone));
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).chain(alone).collect();
     let would_show = (findings.is_empty() && !unexplained)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));

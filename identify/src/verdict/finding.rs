@@ -45,6 +45,7 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, explored: &Explored, c
             EFFECTS[effect].description(),
             at_bounds
         ),
+        proved: false,
     }
 }
 

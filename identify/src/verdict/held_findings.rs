@@ -46,6 +46,7 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
         rmse_before: after.hypot(held.error),
         rmse_after: after,
         evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}; the other readings alone are diagnosed"),
+        proved: true,
     });
     report.findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
     report.suspects.retain(|suspect| suspect.cause != cause);

@@ -59,6 +59,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
                     "; readings were cut off to the step below, not rounded"
                 }
             ),
+            proved: true,
         });
     }
     for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
@@ -81,6 +82,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
                 scales.restored(Dimension::Reading, bound),
                 if upper == (scales.reading > 0.0) { "highest" } else { "lowest" }
             ),
+            proved: true,
         });
     }
     if let Some((_, wide)) = fit.noise.outliers.filter(|_| isolated) {
@@ -101,6 +103,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
                 scales.shown(Dimension::ReadingSize, wide, 2),
                 wide / fit.noise.sigma
             ),
+            proved: false,
         });
     }
     findings

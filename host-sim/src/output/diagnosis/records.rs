@@ -90,6 +90,7 @@ mod tests {
             rmse_before: 2.0,
             rmse_after: 1.0,
             evidence: String::new(),
+            proved: false,
         };
         let of = |name: &str, findings: Vec<Finding>| RecordReport {
             name: name.to_owned(),

@@ -349,6 +349,7 @@ mod tests {
             rmse_before: 7.86,
             rmse_after: 7.86,
             evidence: String::new(),
+            proved: false,
         };
         answer::Report {
             schema: SCHEMA,
