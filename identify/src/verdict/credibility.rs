@@ -151,6 +151,10 @@ mod tests {
         let [large, small, exact] = probabilities(&findings)[..] else { panic!() };
         // Some law is then unknown.
         assert!((0.9..0.95).contains(&large) && small < 0.3 && exact == 1.0, "{large} {small} {exact}");
+        // A bound that the search found, in front of the noise, is proved by nothing.
+        let mut findings = [finding("hysteresis", 20.0), finding("sensor-saturation", 1.3)];
+        with_unknown_laws(&mut findings);
+        assert!(probabilities(&findings)[1] < 0.3, "{findings:?}");
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
         with_unknown_laws(&mut findings);
         assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
@@ -178,6 +182,7 @@ mod tests {
         assert_eq!(likely_alone(&open), Some(vec!["hysteresis", "quantisation"]));
         assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.05)]), None, "a suspect");
         assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.6)]), None);
+        assert_eq!(likely_alone(&[probable("delay", 0.3), probable("quantisation", 1.0)]), Some(vec!["quantisation"]));
         let beside_proved = [probable("delay", 0.03), probable("quantisation", 1.0)];
         assert_eq!(likely_alone(&beside_proved), Some(vec!["quantisation"]), "no likely cause but what is proved");
         assert_eq!(likely_alone(&[probable("delay", 0.03)]), Some(Vec::new()));

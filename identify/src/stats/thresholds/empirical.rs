@@ -56,7 +56,7 @@ thresholds! {
     RELEVANT_RATIO = 1.3, "of the scale at the lowest level";
     /// Fewest equal readings at an extreme that are taken for a bound of the sensor.
     FEWEST_TIES = 3.0, "readings";
-    /// Readings at a bound must outnumber those at the next step of a quantisation grid by this factor.
+    /// Readings at a bound must outnumber those at the next step of a quantisation grid, or any other repeated reading, by this factor.
     BOUND_TO_NEXT_STEP = 6.0, "of the readings at the next step";
     /// A reading that is further from an extreme is not a neighbour of it: isolated error codes are not a bound.
     CLOSE_TO_BOUND = 30.0, "scales of the noise";
