@@ -10,6 +10,7 @@ use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::record::spectrum::{self, Peak};
+use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LINE_TO_NEIGHBOURS};
 
 pub(super) struct Hum;
@@ -25,6 +26,22 @@ const HARMONICS: usize = 3;
 /// Frequencies that are tried on each side of a line, and their distance, in periods per record.
 const LINE_STEPS: i32 = 5;
 const LINE_STEP: f64 = 0.1;
+
+/// Multiples of a frequency of the voltage that the response to it has.
+const MULTIPLES: [f64; 3] = [1.0, 2.0, 3.0];
+/// Part of the voltage's mean square in a sine from which the voltage is one. Half a period more or less in the record leaves 0.4 of it.
+const PART_OF_SINE: f64 = 0.25;
+
+/// Returns true if a frequency is one at which the voltage drives the spring, or a multiple of it: no record can tell a disturbance from
+/// the response there.
+fn is_driven(frequency_hz: f64, data: &Data) -> bool {
+    let mean = data.voltage_v.iter().sum::<f64>() / data.rows() as f64;
+    let voltage: Vec<f64> = data.voltage_v.iter().map(|voltage| voltage - mean).collect();
+    MULTIPLES.iter().any(|multiple| {
+        let line = spectrum::line(&voltage, data, frequency_hz / multiple);
+        0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(&voltage, &voltage)
+    })
+}
 
 /// Returns the number of sines of a form.
 fn sines(form: usize) -> usize {
@@ -99,6 +116,7 @@ impl Effect for Hum {
         peaks
             .into_iter()
             .filter(|peak| peak.frequency_hz > FEWEST_PERIODS.get() / data.duration_s())
+            .filter(|peak| !is_driven(peak.frequency_hz, data))
             .map(start)
             .collect()
     }
@@ -128,5 +146,33 @@ impl Effect for Hum {
             }
             *reading += if form == IN_PROPORTION { *reading * sum } else { sum };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    /// A line of 3 V is at `line_hz` in the residual, the voltage a sine of 5 Hz.
+    #[test]
+    fn a_line_at_a_multiple_of_the_voltages_frequency_is_no_disturbance() {
+        let tried = |line_hz: f64| {
+            let sine = |row: usize, frequency_hz: f64| (TAU * frequency_hz * 0.005 * row as f64).sin();
+            let row = |row| Row {
+                line: 0,
+                time_s: 0.005 * row as f64,
+                voltage_v: 50.0 + 40.0 * sine(row, 5.0),
+                measured: Some(0.0),
+            };
+            let data = Data::new(&Record { name: String::new(), rows: (0..2000).map(row).collect() }, Input::Hold);
+            let residual: Vec<f64> = (0..2000).map(|row| 3.0 * sine(row, line_hz)).collect();
+            let points = Hum.initial_points(SINE, &FitContext { data: &data, residual: &residual, sigma: 0.1 });
+            points.iter().any(|point| (point[0] - line_hz).abs() < 0.05)
+        };
+        assert!([5.0, 10.0, 15.0].iter().all(|&hz| !tried(hz)) && [3.0, 7.3, 50.0].iter().all(|&hz| tried(hz)));
     }
 }
