@@ -1,7 +1,6 @@
 //! The plant file of an identified spring is the spring that was identified: a diagnosis against it starts from the same error.
 
 use identify::nominal::report::InputLaw;
-use identify::plant::base::Base;
 use identify::{Input, Options, Verdict, examine, identify};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
@@ -11,15 +10,26 @@ type Rates = fn(f64, [f64; 2]) -> [f64; 2];
 
 /// A record of random steps, integrated in small Euler steps; `reading` of voltage and state, with uniform noise of +-0.005.
 fn record(rates: Rates, reading: fn(f64, [f64; 2]) -> f64, heights: [f64; 2]) -> Record {
+    record_from([0.0; 2], 5, rates, reading, heights)
+}
+
+/// The same from a state at the first row; the first step follows after some rows.
+fn record_from(
+    start: [f64; 2],
+    first_step: usize,
+    rates: Rates,
+    reading: fn(f64, [f64; 2]) -> f64,
+    heights: [f64; 2],
+) -> Record {
     let (sample_s, steps) = (0.05, 400);
     let mut seed = 7u32;
     let mut random = || {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(seed >> 8) / f64::from(1 << 24)
     };
-    let (mut state, mut voltage_v) = ([0.0; 2], 0.0);
+    let (mut state, mut voltage_v) = (start, 0.0);
     let mut row = |index: usize| {
-        if index % 23 == 5 {
+        if index % 23 == first_step {
             voltage_v = heights[0] + (heights[1] - heights[0]) * random();
         }
         let measured = Some(reading(voltage_v, state) + 0.01 * (random() - 0.5));
@@ -45,12 +55,27 @@ fn a_diagnosis_starts_from_the_error_of_the_identified_spring() {
         let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
         let report = &identified.report;
         assert_eq!(report.order, order, "{name}: {report:#?}");
-        assert!(report.rmse < 0.0035, "{name}: {}", report.rmse);
+        let rmse = report.rmse;
+        assert!(rmse < 0.0035, "{name}: {rmse}");
         assert_eq!(identified.plant.even, name == "even");
-        let options = Options { base: Base::new(identified.plant).unwrap(), ..Options::default() };
+        let options = Options::default().judging(identified).unwrap();
         let baseline = examine(&record, &options, |_| ()).unwrap().report.baseline;
-        assert!(baseline.rmse < 1.1 * report.rmse, "{name}: {} instead of {}", baseline.rmse, report.rmse);
+        assert!(baseline.rmse < 1.1 * rmse, "{name}: {} instead of {rmse}", baseline.rmse);
     }
+}
+
+/// At the first row, the only one before the first step, the resonator passes its zero.
+#[test]
+fn a_spring_that_moves_when_the_record_begins_is_judged_from_its_motion() {
+    let resonator: Rates = |u, [x, v]| [v, 36.0 * (u - x) - 0.05 * 6.0 * v];
+    let record = record_from([0.0, 12.0], 1, resonator, |_, [x, _]| 1.0 + 2.0 * x, [-1.0, 1.0]);
+    let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+    let rmse = identified.report.rmse;
+    assert!(!identified.settled && rmse < 0.0035, "{rmse}");
+    let options = Options::default().judging(identified).unwrap();
+    let report = examine(&record, &options, |_| ()).unwrap().report;
+    assert!(report.baseline.rmse < 1.1 * rmse, "{} instead of {rmse}", report.baseline.rmse);
+    assert_eq!(report.findings.len(), 0, "{:?}", report.findings);
 }
 
 /// The square law in the plant file is the spring's, so that nothing is found beyond it.
@@ -66,7 +91,7 @@ fn a_diagnosis_of_an_identified_square_law_is_consistent() {
             let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
             assert_eq!((identified.report.input_law, identified.plant.even), (InputLaw::Square, heights[0] < 0.0));
             assert!((identified.report.nominal.share.value - share).abs() < 0.02, "{:?}", identified.report.nominal);
-            let options = Options { base: Base::new(identified.plant).unwrap(), ..Options::default() };
+            let options = Options::default().judging(identified).unwrap();
             let report = examine(&record, &options, |_| ()).unwrap().report;
             assert_eq!((report.verdict, report.findings.len()), (Verdict::Consistent, 0), "{report:#?}");
         }

@@ -167,22 +167,15 @@ pub fn diagnose(records: &Records, files: &[u8], stop: &Stop, progress: &mut dyn
     let effort: Effort = records.effort.parse()?;
     let mut read = records.read(files)?;
     read.records.iter().try_for_each(|record| read.input.check(record))?;
-    let (name, plant, linear) = match records.plant.as_str() {
-        "identify" => {
-            let found = read.identify()?;
-            ("identify", found.plant, found.linear)
-        }
-        "paper" => ("paper", plant_file::load_for_host("paper")?, None),
-        text => ("plant.toml", plant_file::parse_for_host("plant.toml", text)?, None),
+    let options =
+        Options { units: read.units.clone(), input: read.input, effort, stop: stop.clone(), ..Options::default() };
+    let of_file = |options: Options, plant: &str, file| {
+        anyhow::Ok(Options { plant: plant.to_owned(), base: Base::new(file)?, ..options })
     };
-    let options = Options {
-        plant: name.to_owned(),
-        units: read.units.clone(),
-        input: read.input,
-        base: Base::new(plant)?,
-        effort,
-        linear,
-        stop: stop.clone(),
+    let options = match records.plant.as_str() {
+        "identify" => options.judging(read.identify()?)?,
+        "paper" => of_file(options, "paper", plant_file::load_for_host("paper")?)?,
+        text => of_file(options, "plant.toml", plant_file::parse_for_host("plant.toml", text)?)?,
     };
     read.remarks.extend(options.remark());
     let found = examine_several(&read.records, &options, |causes| {

@@ -114,15 +114,16 @@ pub(crate) fn diagnose<'py>(
         let rows = records.rows();
         rows.iter().try_for_each(|record| records.input.check(record))?;
         let units = records.measured[0].units.clone();
-        let (plant, file, linear) = match plant {
+        let options = Options { units, input: records.input, effort, stop, ..Options::default() };
+        let of_file = |options: Options, plant: String, file| anyhow::Ok(Options { plant, base: Base::new(file)?, ..options });
+        let options = match plant {
             Plant::Named(name) if name == "identify" => {
-                let identified = ::identify::identify(&rows, records.input, &units)?;
-                (name, identified.plant, identified.linear)
+                let identified = ::identify::identify(&rows, records.input, &options.units)?;
+                options.judging(identified)?
             }
-            Plant::Named(name) => (name.clone(), plant_file::load_for_host(&name)?, None),
-            Plant::Text((name, text)) => (name.clone(), plant_file::parse_for_host(&name, &text)?, None),
+            Plant::Named(name) => of_file(options, name.clone(), plant_file::load_for_host(&name)?)?,
+            Plant::Text((name, text)) => of_file(options, name.clone(), plant_file::parse_for_host(&name, &text)?)?,
         };
-        let options = Options { plant, units, input: records.input, base: Base::new(file)?, effort, linear, stop };
         records.remarks.extend(options.remark());
         let found = examine_several(&rows, &options, |_| {})?;
         let json = serde_json::to_string(&found.report)?;

@@ -78,15 +78,16 @@ impl Arguments {
     /// The options of the diagnosis: the one place where its nominal spring is made.
     fn options(&self, measured: &[MeasuredRecord], records: &[Record], input: Input, stop: Stop) -> Result<Options> {
         let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
-        let (file, linear) = match self.plant.as_str() {
+        let options = Options { units, input, effort: self.effort, stop, ..Options::default() };
+        match self.plant.as_str() {
             "identify" => {
-                let identified = identify(records, input, &units)?;
-                (identified.plant, identified.linear)
+                let identified = identify(records, input, &options.units)?;
+                options.judging(identified)
             }
-            plant => (plant_file::load_for_host(plant)?, None),
-        };
-        let plant = self.plant.clone();
-        Ok(Options { plant, units, input, base: Base::new(file)?, effort: self.effort, linear, stop })
+            plant => {
+                Ok(Options { plant: plant.to_owned(), base: Base::new(plant_file::load_for_host(plant)?)?, ..options })
+            }
+        }
     }
 
     fn origin(measured: &[MeasuredRecord], input: Input) -> Origin {

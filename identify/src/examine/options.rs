@@ -1,10 +1,11 @@
 //! The options of a diagnosis.
 
+use anyhow::Result;
 use simulation::units::Units;
 
 use crate::fit::budget::Effort;
 use crate::fit::stop::Stop;
-use crate::nominal::BestLinear;
+use crate::nominal::{BestLinear, Identified};
 use crate::plant::base::Base;
 use crate::record::input::Input;
 
@@ -19,6 +20,8 @@ pub struct Options {
     pub input: Input,
     /// The simulation that is diagnosed.
     pub base: Base,
+    /// True if the spring may not have settled when a record begins, even if its first readings show no decay.
+    pub unsettled: bool,
     /// How long causes are searched for.
     pub effort: Effort,
     /// The best linear model of the records, if it is known; it is fitted otherwise.
@@ -28,6 +31,15 @@ pub struct Options {
 }
 
 impl Options {
+    /// Returns the options for a diagnosis of what was identified from the same records.
+    ///
+    /// # Errors
+    /// Those of [`Base::new`].
+    pub fn judging(self, identified: Identified) -> Result<Self> {
+        let Identified { plant, settled, linear, .. } = identified;
+        Ok(Self { plant: "identify".into(), base: Base::new(plant)?, unsettled: !settled, linear, ..self })
+    }
+
     /// Returns what the user should know who compares readings of another quantity with the paper's spring: its gain and zero are no
     /// causes then.
     pub fn remark(&self) -> Option<String> {
@@ -49,6 +61,7 @@ impl Default for Options {
             units: Units::default(),
             input: Input::Hold,
             base: Base::paper(),
+            unsettled: false,
             effort: Effort::Normal,
             linear: None,
             stop: Stop::default(),

@@ -105,7 +105,8 @@ pub(super) fn joint(
     only: Option<&[&'static str]>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Normalised> {
-    let normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
+    let mut normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
+    normalisations.iter_mut().for_each(|of| of.unsettled = options.unsettled);
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let base = options.base.normalised(&normalisations[0]);
     let prepare = |(record, of)| Data::thinned(record, options.input, 1, of);

@@ -26,6 +26,8 @@ pub(super) struct Path {
     pub(super) voltage: Vec<f64>,
     /// Voltage at the start.
     before: f64,
+    /// True if there is no free response.
+    at_rest: bool,
     steps: Vec<Step>,
     lengths: Vec<f64>,
 }
@@ -34,7 +36,7 @@ pub(super) struct Path {
 pub(super) struct Response {
     /// `w` and `v` under the voltage, from rest at the voltage of the first reading.
     pub(super) forced: [Vec<f64>; 2],
-    /// `w` without a voltage, and `-v`, from `w = 1` and `v = 0`: the two span all free responses.
+    /// `w` without a voltage, and `-v`, from `w = 1` and `v = 0`: the two span all free responses. 0 of a spring at rest.
     pub(super) free: [Vec<f64>; 2],
 }
 
@@ -82,6 +84,7 @@ impl Path {
         let path = Self {
             voltage: Vec::with_capacity(rows),
             before: 0.0,
+            at_rest: series.at_rest,
             steps: Vec::with_capacity(rows),
             lengths: Vec::new(),
         };
@@ -118,7 +121,7 @@ impl Path {
         let column = || Vec::with_capacity(rows);
         let mut response = Response { forced: [column(), column()], free: [column(), column()] };
         let over: Vec<Transition> = self.lengths.iter().map(|&length| section.over(length)).collect();
-        let (mut state, mut free): (State, State) = ([self.before, 0.0], [1.0, 0.0]);
+        let (mut state, mut free): (State, State) = ([self.before, 0.0], [f64::from(u8::from(!self.at_rest)), 0.0]);
         let mut put = |state: State, free: State| {
             for of in 0..2 {
                 response.forced[of].push(state[of]);

@@ -3,6 +3,7 @@
 use simulation::record::Record;
 use simulation::schedule::Schedule;
 
+use crate::record::decay::starts_at_rest;
 use crate::record::folds::folds;
 use crate::record::input::Input;
 use crate::stats::median::median;
@@ -43,6 +44,7 @@ pub struct Series {
     pub even: bool,
     /// True if the readings are equally spaced.
     pub uniform: bool,
+    pub(super) at_rest: bool,
     pieces: Vec<Piece>,
 }
 
@@ -68,10 +70,12 @@ impl Series {
         let rows = || record.rows.iter().zip(&times).filter_map(|(row, time)| Some((row, *time, row.measured?)));
         let commanded: Vec<f64> = rows().map(|(row, ..)| row.voltage_v).collect();
         let time: Vec<f64> = rows().map(|(_, time, _)| time).collect();
+        let reading: Vec<f64> = rows().map(|(.., reading)| reading).collect();
         Self {
+            at_rest: starts_at_rest(&time, &commanded, &reading),
             start: time.first().copied().unwrap_or(0.0),
             time,
-            reading: rows().map(|(.., reading)| reading).collect(),
+            reading,
             fold: folds(&commanded),
             spacing: if evenly { step } else { spacing },
             held: input == Input::Hold,
@@ -79,6 +83,11 @@ impl Series {
             uniform: evenly && commanded.len() == voltage.len(),
             pieces,
         }
+    }
+
+    /// The series with a free response.
+    pub fn started(self) -> Self {
+        Self { at_rest: false, ..self }
     }
 
     /// The series with every `every`-th reading and the voltage of all rows.
@@ -121,8 +130,14 @@ impl Series {
         let (from, to) = (self.pieces[most].start, self.pieces[most + pieces - 1].start);
         let mut part = self.only(|row| (from..=to).contains(&self.time[row]));
         part.start = from.max(self.start);
+        part.at_rest &= part.start == self.start;
         part.pieces = self.pieces[most..most + pieces].to_vec();
         part
+    }
+
+    /// True if the spring is at rest when the series starts: it has no free response.
+    pub fn is_at_rest(&self) -> bool {
+        self.at_rest
     }
 
     /// The series under the magnitude of its voltage.

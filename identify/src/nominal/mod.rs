@@ -65,6 +65,8 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
+    /// True if the spring was taken to be at rest when each record begins.
+    pub settled: bool,
     /// The best linear model of the records, which may be of another order or law of the input.
     pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
@@ -107,7 +109,20 @@ struct Model {
 }
 
 impl Models {
+    /// The best models, from rest if the records start at rest; with free responses all the same, if these explain what is left of the
+    /// best one: readings before the first voltage do not show a slow decay.
     fn of(series: Vec<Series>, law: InputLaw) -> Self {
+        let models = Self::with_starts(series, law);
+        let from_rest = models.problem.series.iter().any(|series| series.is_at_rest());
+        if !from_rest || !is_structured(&models.problem, &models.best_fit().residual) {
+            return models;
+        }
+        let started = models.problem.series.iter().map(|series| series.clone().started()).collect();
+        let others = Self::with_starts(started, law);
+        if is_structured(&others.problem, &others.best_fit().residual) { models } else { others }
+    }
+
+    fn with_starts(series: Vec<Series>, law: InputLaw) -> Self {
         let problem = Problem::new(series);
         let with_errors = |fit: Fit| {
             let held_out = held_out_residual(&problem, &fit);
@@ -135,6 +150,15 @@ impl Models {
     fn held_out_rmse(&self) -> f64 {
         root_mean_square(&self.fits[self.chosen].held_out)
     }
+
+    fn best_fit(&self) -> &Fit {
+        &self.fits[self.chosen].fit
+    }
+}
+
+/// True if errors are no noise of the sensor.
+fn is_structured(problem: &Problem, residual: &[f64]) -> bool {
+    root_mean_square(residual) > STRUCTURED * scatter(problem, residual)
 }
 
 fn error(order: usize, fit: &Fit, held_out: &[f64], last_part: f64) -> LinearError {
@@ -160,8 +184,9 @@ fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
     }
     let confirmed = large.last_part < (1.0 - WORTHWHILE) * small.last_part;
     // Errors of a spring that is not linear are no noise, so that no order is right and their likelihood says little.
-    let is_structure = root_mean_square(&large.fit.residual) > STRUCTURED * scatter(problem, &large.fit.residual);
-    if is_structure || excess(&small.held_out, &large.held_out) > if confirmed { Z_DOUBTFUL } else { Z_WORSE } {
+    if is_structured(problem, &large.fit.residual)
+        || excess(&small.held_out, &large.held_out) > if confirmed { Z_DOUBTFUL } else { Z_WORSE }
+    {
         return true;
     }
     let Spectrum { ar, innovations } = Spectrum::of(&large.held_out, problem.starts(), &[]);
@@ -335,7 +360,8 @@ fn identified(records: &[Record], models: Models, voltage: VoltageRange, units: 
         }
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
-    Identified { report, plant, linear: None, records }
+    let settled = problem.series.iter().all(Series::is_at_rest);
+    Identified { report, plant, settled, linear: None, records }
 }
 
 /// Scatter of errors from row to row: what is left of them without their slow part.

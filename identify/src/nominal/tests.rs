@@ -1,3 +1,5 @@
+use std::f64::consts::TAU;
+
 use simulation::record::Row;
 
 use super::*;
@@ -191,4 +193,24 @@ fn records_without_information_are_rejected_in_one_line() {
         let error = identify(&[record], Input::Hold, &Units::default()).unwrap_err().to_string();
         assert!(error.contains(expected) && !error.contains('\n'), "{error}");
     }
+}
+
+/// A square-root law under steps of one period of a sine, after a rest: no linear model describes it, and free responses would follow
+/// the law.
+#[test]
+fn readings_at_rest_tell_that_a_nonlinear_spring_starts_at_rest() {
+    let noise = normals(1000);
+    let decay = f64::exp(-1.0 / 12.0);
+    let mut lag = 0.0;
+    let row = |row: usize| {
+        let phase = TAU * row.saturating_sub(40) as f64 / 960.0;
+        let voltage_v = (10.0 * phase.sin()).round() / 10.0;
+        let measured = Some(10.0 * lag + 0.02 * noise[row]);
+        let law = voltage_v.signum() * voltage_v.abs().sqrt();
+        lag = law + (lag - law) * decay;
+        Row { line: 0, time_s: 0.1 * row as f64, voltage_v, measured }
+    };
+    let identified = found(&[Record { name: "root".into(), rows: (0..1000).map(row).collect() }]);
+    let start = &identified.report.start[0];
+    assert!(identified.settled && start.offset.value == 0.0, "{start:?}");
 }

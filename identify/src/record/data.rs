@@ -84,7 +84,9 @@ impl Data {
         let first_v = voltage_v.first().copied().unwrap_or(0.0);
         let offset = normalisation.start.map_or(0.0, |start| start.offset);
         // Decided from all rows, so that a subset gets the same coordinates.
-        let initial_state_unknown = first_v != 0.0 || relaxes_from_earlier_input(&time_s, &voltage_v, &reading, offset);
+        let initial_state_unknown = normalisation.unsettled
+            || first_v != 0.0
+            || relaxes_from_earlier_input(&time_s, &voltage_v, &reading, offset);
         let [time_s, voltage_v, reading] = [time_s, voltage_v, reading].map(|all| match every {
             1 => all,
             _ => all.into_iter().step_by(every).collect(),

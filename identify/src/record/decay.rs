@@ -2,37 +2,58 @@
 
 use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 use crate::stats::scale::{robust_scale, second_differences};
-use crate::stats::thresholds::empirical::{FEWEST_ROWS_AT_REST, LARGEST_CORRELATION, SHORT_REST, SIGNIFICANT_DECAY};
+use crate::stats::thresholds::empirical::{
+    FEWEST_ROWS_AT_REST, FEWEST_ROWS_OF_REST, LARGEST_CORRELATION, SHORT_REST, SIGNIFICANT_DECAY,
+};
 
-/// Time constants of the decays that are tried, relative to the reference.
+/// Time constants of the decays that are tried, relative to the expected one.
 const DECAY_TIMES: [f64; 3] = [0.5, 1.0, 2.0];
+/// Longest time constant of a decay that readings at rest can show, in lengths of the rest.
+const LONGEST_DECAY: f64 = 2.0;
 
 /// Returns true if the readings before the first voltage contain an exponential decay from an earlier stiffness; where
 /// the rest is too short to show a decay, if the readings differ from `zero`.
 pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], reading: &[f64], zero: f64) -> bool {
-    let rest = voltage_v.iter().take_while(|voltage| **voltage == 0.0).count();
+    let rest = rows_before_voltage(voltage_v);
     if rest == 0 {
         return false;
     }
-    let (time_s, at_rest) = (&time_s[..rest], &reading[..rest]);
     let tau_s = REFERENCE_TIME_CONSTANT_S;
     let short = rest < FEWEST_ROWS_AT_REST.count() || time_s[rest - 1] - time_s[0] < SHORT_REST.get() * tau_s;
-    let new_v = robust_scale(&second_differences(reading).collect::<Vec<_>>());
-    let falls = |tau_s: f64| {
-        let decay: Vec<f64> = time_s.iter().map(|time| (-(time - time_s[0]) / tau_s).exp()).collect();
-        // Least squares on the decay, and on a constant where the two can be distinguished.
-        let mean = |values: &[f64], short_mean: f64| match short {
-            true => short_mean,
-            false => values.iter().sum::<f64>() / rest as f64,
-        };
-        let (mean_decay, mean_reading) = (mean(&decay, 0.0), mean(at_rest, zero));
-        let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
-        let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
-        let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
-        let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
-        height.abs() * power.sqrt() > SIGNIFICANT_DECAY.get() * new_v.max(scaled_deviation_of_sum(&left))
-    };
-    DECAY_TIMES.iter().any(|times| falls(times * tau_s))
+    DECAY_TIMES.iter().any(|times| decays(&time_s[..rest], reading, short.then_some(zero), times * tau_s))
+}
+
+/// Returns true if there are readings enough before the first voltage and none of them shows a decay. A decay so slow that they cannot
+/// show it may remain.
+pub(crate) fn starts_at_rest(time: &[f64], voltage: &[f64], reading: &[f64]) -> bool {
+    let rest = rows_before_voltage(voltage);
+    if rest < FEWEST_ROWS_OF_REST.count() {
+        return false;
+    }
+    let length = time[rest - 1] - time[0];
+    let halves = std::iter::successors(Some(LONGEST_DECAY * length), |tau| Some(0.5 * tau));
+    let mut longer_than_a_row = halves.take_while(|tau| *tau > length / rest as f64);
+    !longer_than_a_row.any(|tau| decays(&time[..rest], reading, None, tau))
+}
+
+fn rows_before_voltage(voltage: &[f64]) -> usize {
+    voltage.iter().take_while(|voltage| **voltage == 0.0).count()
+}
+
+/// Returns true if the first readings, one for each of `time`, contain an exponential decay with about the time constant `tau`, to
+/// `zero` or, without one, to any value.
+fn decays(time: &[f64], reading: &[f64], zero: Option<f64>, tau: f64) -> bool {
+    let at_rest = &reading[..time.len()];
+    let from_row_to_row = robust_scale(&second_differences(reading).collect::<Vec<_>>());
+    let decay: Vec<f64> = time.iter().map(|at| (-(at - time[0]) / tau).exp()).collect();
+    // Least squares on the decay, and on a constant where the two can be distinguished.
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (mean_decay, mean_reading) = zero.map_or_else(|| (mean(&decay), mean(at_rest)), |zero| (0.0, zero));
+    let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
+    let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
+    let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
+    let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
+    height.abs() * power.sqrt() > SIGNIFICANT_DECAY.get() * from_row_to_row.max(scaled_deviation_of_sum(&left))
 }
 
 /// Returns the standard deviation of the sum of autocorrelated noise over `n` rows, divided by `sqrt(n)`: `sigma
@@ -46,6 +67,7 @@ fn scaled_deviation_of_sum(noise: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::starts_at_rest;
     use crate::record::data::Data;
     use crate::record::input::Input;
     use crate::stats::scale::normals;
@@ -81,6 +103,24 @@ mod tests {
                 let decay = |time: f64, noise| 60.0 * (-time / tau_s).exp() + noise;
                 let falls = (0..100).filter(|seed| record(&decay, at_rest, *seed));
                 assert!(falls.count() > 90, "{at_rest} rows, {tau_s} s");
+            }
+        }
+    }
+
+    #[test]
+    fn readings_without_a_decay_show_a_rest_whatever_the_unit_of_time() {
+        let noise = normals(400);
+        let starts = |rest: usize, tau: f64, second: f64| {
+            let time: Vec<f64> = (0..400).map(|row| second * row as f64).collect();
+            let voltage: Vec<f64> = (0..400).map(|row| if row < rest { 0.0 } else { 1.0 }).collect();
+            let decay = |row: usize| if tau > 0.0 { 40.0 * (-(row as f64) / tau).exp() } else { 0.0 };
+            let reading: Vec<f64> = (0..400).map(|row| 7.0 + decay(row) + noise[row]).collect();
+            starts_at_rest(&time, &voltage, &reading)
+        };
+        for second in [1e-6, 1.0, 3600.0] {
+            assert!(starts(60, 0.0, second) && starts(12, 0.0, second) && !starts(6, 0.0, second));
+            for tau in [3.0, 10.0, 30.0, 120.0] {
+                assert!(!starts(60, tau, second), "{tau} rows");
             }
         }
     }

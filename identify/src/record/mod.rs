@@ -10,7 +10,7 @@
 //! - *Censored reading*: one that stopped at a bound of the sensor.
 
 pub mod data;
-mod decay;
+pub(crate) mod decay;
 mod first_order;
 pub(crate) mod folds;
 pub mod held;

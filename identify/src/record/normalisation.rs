@@ -57,12 +57,14 @@ pub struct Normalisation {
     pub even: bool,
     /// Where the search starts; `None` if the nominal spring is not far from the record.
     pub start: Option<Start>,
+    /// True if the spring may not have settled when the record begins, even if its first readings show no decay.
+    pub unsettled: bool,
 }
 
 impl Default for Normalisation {
     /// The file's own numbers, and the paper's spring.
     fn default() -> Self {
-        Self { scales: Scales::default(), share: model::Plant::PAPER.share, even: false, start: None }
+        Self { scales: Scales::default(), share: model::Plant::PAPER.share, even: false, start: None, unsettled: false }
     }
 }
 
@@ -76,7 +78,7 @@ impl Normalisation {
         if input == Input::Stair {
             // The stair has its own times and voltages, in s and V.
             scales.reading = reading.gain;
-            return Self { scales, share, even, start: None };
+            return Self { scales, share, even, ..Self::default() };
         }
         let full_scale_v = record.rows.iter().map(|row| row.voltage_v.abs()).fold(0.0, f64::max);
         let far = |ratio: f64, times: f64| !(1.0 / times..=times).contains(&ratio);
@@ -109,7 +111,7 @@ impl Normalisation {
             share: best.share.clamp(0.0, 1.0),
             offset: (best.zero - reading.zero) / scales.reading,
         });
-        Self { share: start.map_or(share, |start| start.share), scales, even, start }
+        Self { share: start.map_or(share, |start| start.share), scales, even, start, unsettled: false }
     }
 
     /// Chooses the coordinates for several records of one spring: those of the first, but that time begins with each.

@@ -21,7 +21,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use cpu_time::ProcessTime;
 use identify::nominal::identify;
-use identify::plant::base::Base;
 use identify::stats::scale::{centred, root_mean_square};
 use identify::{Input, Options, examine};
 use indicatif::ProgressBar;
@@ -166,22 +165,15 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
     let identified = identify(std::slice::from_ref(record), *input, units)?;
     let identifying = start.elapsed().as_secs_f64();
     let report = &identified.report;
-    let plant = "identify".to_owned();
-    let options = Options {
-        plant,
-        units: units.clone(),
-        input: *input,
-        base: Base::new(identified.plant.clone())?,
-        linear: identified.linear.clone(),
-        ..Options::default()
-    };
+    let options = Options { units: units.clone(), input: *input, ..Options::default() };
+    let options = options.judging(identified.clone())?;
     let diagnosis = examine(record, &options, |_| ())?;
     let seconds = [identifying, start.elapsed().as_secs_f64()];
 
     let learnt = (LEARN * record.rows.len() as f64) as usize;
     let first = Record { name: record.name.clone(), rows: record.rows[..learnt].to_vec() };
     let of_first = identify(std::slice::from_ref(&first), *input, units)?;
-    let options = Options { base: Base::new(of_first.plant)?, linear: of_first.linear, ..options };
+    let options = options.judging(of_first)?;
     let beyond = residuals_beyond(record, learnt, &options)?.map(|left| Some(root_mean_square(&left)));
 
     let linear = |most: usize| {

@@ -33,6 +33,8 @@ thresholds! {
     // record
     /// Fewer readings before the first voltage cannot show a decay of the spring.
     FEWEST_ROWS_AT_REST = 4.0, "readings";
+    /// Fewer readings before the first voltage cannot show that a spring of unknown time constant is at rest.
+    FEWEST_ROWS_OF_REST = 10.0, "readings";
     /// A shorter rest before the first voltage cannot show a decay of the spring.
     SHORT_REST = 0.3, "time constants";
     /// A decay before the first voltage with a larger amplitude shows that the spring was not at rest; the noise's
