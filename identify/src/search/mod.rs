@@ -28,6 +28,7 @@
 //! | `evaluated` | all structures evaluated so far, and the prices |
 //! | `structure_search` | the search |
 //! | `extend` | a structure's extensions: which are fitted, and which of those are evaluated |
+//! | `predicting` | the structure that a search ends with, by held-out error where the likeliest does not predict |
 //! | `explored` | what a search has evaluated, for questions of the report |
 
 mod evaluated;
@@ -38,6 +39,7 @@ mod first_fits;
 mod initial_models;
 mod penalty_factor;
 mod predicted_gain;
+mod predicting;
 mod scored;
 mod structure_search;
 #[cfg(test)]

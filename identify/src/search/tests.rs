@@ -243,3 +243,26 @@ fn a_warm_start_is_evaluated_and_extended() {
     (evaluator.hidden, evaluator.penalty_factor) = (None, 4.5);
     assert_eq!(effects(&search_from(&mut evaluator).fit.model), [effect("delay")]);
 }
+
+/// Held-out errors by the causes: the likeliest set predicts worse than the simulation as it is given.
+#[test]
+fn of_structures_that_do_not_predict_the_next_likely_one_that_does_is_taken() {
+    let mut evaluator = tabulated(&[(&["drift"], 90.0), (&["delay"], 60.0), (&["resonance"], 50.0)]);
+    let mut search = Search::new(&mut evaluator);
+    let best = search.run(|_| ());
+    assert_eq!(effects(&best.fit.model), [effect("drift")]);
+    let mut taken = |of_drift: f64, of_delay: f64, larger: &[&str]| {
+        let errors = [("drift", of_drift), ("delay", of_delay), ("resonance", 0.5)];
+        let is_larger = |fit: &Fit| larger.iter().any(|cause| effects(&fit.model) == [effect(cause)]);
+        let held_out = |_: &mut Tabulated, fit: &Fit| match effects(&fit.model)[..] {
+            [] => 1.0,
+            [only] => errors.iter().find(|(cause, _)| effect(cause) == only).map_or(2.0, |(_, error)| *error),
+            _ => 2.0,
+        };
+        effects(&search.predicting(best.clone(), is_larger, held_out).fit.model)
+    };
+    assert_eq!(taken(0.9, 0.3, &[]), [effect("drift")], "it predicts");
+    assert_eq!(taken(1.1, 0.3, &[]), [effect("delay")]);
+    assert_eq!(taken(0.9, 0.7, &["drift"]), [effect("resonance")], "the one that predicts best");
+    assert_eq!(taken(1.1, 1.2, &["resonance"]), [0; 0], "the simulation as it is given");
+}

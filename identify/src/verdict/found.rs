@@ -10,9 +10,6 @@ use crate::verdict::alternatives::rivals;
 use crate::verdict::cause::Cause;
 use crate::verdict::ranking;
 
-/// Structures that are compared by held-out error where the likeliest does not predict.
-const MOST_COMPARED: usize = 8;
-
 /// A finished search.
 pub(crate) struct Found {
     /// The best structure.
@@ -55,7 +52,7 @@ pub(crate) fn search(
     let is_larger = |fit: &Fit| error(&fit.residual) > most;
     if is_larger(&best.fit) || search.evaluator().budget().was_cut() {
         let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
-        best = predicting(&mut search, best, is_larger, held_out);
+        best = search.predicting(best, is_larger, held_out);
     }
     let candidate = Candidate { fit: &best.fit, score: best.score };
     if let Some(reason) = adequacy::unidentifiable(search.evaluator(), &candidate, When::AfterSearch) {
@@ -70,26 +67,6 @@ pub(crate) fn search(
     let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
     let contenders = ranking::contenders(&search, &causes);
     Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best, explored: search.into_explored() })
-}
-
-/// The structure `best` if it predicts better than the simulation as it is given, else the one of the likeliest that predicts best: a
-/// search that was cut may end with causes that do not predict. None whose error `is_larger` than that of the simulation.
-fn predicting(
-    search: &mut Search<Engine>,
-    best: Scored,
-    is_larger: impl Fn(&Fit) -> bool,
-    held_out: impl Fn(&mut Engine, &Fit) -> f64,
-) -> Scored {
-    let root = search.root();
-    let known = held_out(search.evaluator(), &root.fit);
-    if !is_larger(&best.fit) && held_out(search.evaluator(), &best.fit) <= known {
-        return best;
-    }
-    let likeliest = search.ranked().into_iter().filter(|other| !is_larger(&other.fit));
-    let likeliest: Vec<Scored> = likeliest.take(MOST_COMPARED).cloned().collect();
-    let compared = likeliest.into_iter().map(|other| (held_out(search.evaluator(), &other.fit), other));
-    let least = compared.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(error, _)| *error < known);
-    least.map_or(root, |(_, other)| other)
 }
 
 impl Found {
