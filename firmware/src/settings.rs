@@ -11,7 +11,7 @@ use model::device::{self, Watchdogs};
 use model::isolation::{Causes, Tolerance};
 use model::{Amplifier, Feedback, Settings, adaptation, supervisor};
 
-/// Rate of the control tick that is built in, in Hz.
+/// Rate of the control tick that is built in, in Hz: 100 to 2000, with a period in whole microseconds.
 pub const RATE_HZ: u32 = 1000;
 
 /// Longest time without a tick before the hang guard performs the emergency stop, in ms. It exceeds the overrun that the
@@ -77,7 +77,7 @@ pub const fn built_in(control: Settings) -> device::Settings {
 
 /// The paper's controller with `amplifier`, without a sensor.
 pub const fn paper(amplifier: Amplifier) -> Settings {
-    Settings { amplifier, ..Settings::PAPER }
+    Settings { rate_hz: RATE_HZ as f64, amplifier, ..Settings::PAPER }
 }
 
 /// The time-optimal controller with `amplifier`, without a sensor.
@@ -103,7 +103,15 @@ mod tests {
 
     #[test]
     fn an_image_takes_its_amplifier_and_its_sensor_from_its_features_alone() {
-        assert_eq!(paper(KILOVOLT), Settings { amplifier: KILOVOLT, ..Settings::PAPER });
+        assert_eq!(paper(KILOVOLT), Settings { amplifier: KILOVOLT, ..SETTINGS });
         assert_eq!(with_sensor(SETTINGS), Settings { feedback: SENSOR, ..SETTINGS });
+    }
+
+    /// An image with others would start nothing.
+    #[test]
+    fn the_settings_that_are_built_in_can_run_at_the_rate_that_is_built_in() {
+        assert_eq!(BUILT_IN.rate_hz(), RATE_HZ);
+        BUILT_IN.check().unwrap_or_else(|error| panic!("{error}"));
+        BUILT_IN.check_adaptation().unwrap_or_else(|error| panic!("{error}"));
     }
 }

@@ -222,15 +222,15 @@ mod tests {
             (control.supervisor().state(), start)
         };
         let (valid, invalid) = (model(0.1).payload().unwrap(), model(2.0).payload().unwrap());
-        let faulted = State::Faulted;
+        let (faulted, built_in_v) = (State::Faulted, BUILT_IN.control.amplifier.max_v);
         for (stored, last_fault, state, rejected, limit_v) in [
-            (None, None, State::Disarmed, None, 700.0),
-            (None, Some(Fault::Panic), faulted(Fault::Panic), None, 700.0),
+            (None, None, State::Disarmed, None, built_in_v),
+            (None, Some(Fault::Panic), faulted(Fault::Panic), None, built_in_v),
             (Some(&valid[..]), None, State::Disarmed, None, 650.0),
             (Some(&valid), Some(Fault::Panic), faulted(Fault::Panic), None, 650.0),
-            (Some(&invalid), None, faulted(Fault::Config), Some("share"), 700.0),
-            (Some(&invalid), Some(Fault::Panic), faulted(Fault::Config), Some("share"), 700.0),
-            (Some(b"noise"), Some(Fault::Panic), faulted(Fault::Config), Some("format"), 700.0),
+            (Some(&invalid), None, faulted(Fault::Config), Some("share"), built_in_v),
+            (Some(&invalid), Some(Fault::Panic), faulted(Fault::Config), Some("share"), built_in_v),
+            (Some(b"noise"), Some(Fault::Panic), faulted(Fault::Config), Some("format"), built_in_v),
         ] {
             let (is, start) = start(stored, last_fault);
             assert_eq!((is, start.rejected, start.amplifier.max_v), (state, rejected, limit_v));

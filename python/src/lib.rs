@@ -11,9 +11,11 @@
 //! | [`link`] | a running MCU over its serial link |
 //! | [`analysis`] | identification, diagnosis, plan |
 //! | [`controller`] | the controller's tick, and the spring alone |
+//! | [`display`] | numbers as the command shows them |
 
 mod analysis;
 mod controller;
+mod display;
 mod error;
 mod interrupt;
 mod link;
@@ -27,6 +29,8 @@ mod _vsj {
     use crate::analysis::{diagnose, identify, plan};
     #[pymodule_export]
     use crate::controller::{Controller, predict, simulate};
+    #[pymodule_export]
+    use crate::display::{number, with_interval};
     #[pymodule_export]
     use crate::error::{BadInput, LinkError};
     #[pymodule_export]

@@ -68,6 +68,31 @@ def test_plan_equals_the_command(command, diagnosis, tmp_path):
     np.testing.assert_allclose(plan.to_frame()[["time_s", "voltage_v"]], schedule[["time_s", "voltage_v"]], atol=1e-6)
 
 
+def test_a_bound_that_the_record_does_not_show_is_infinite():
+    """In JSON, which has no infinite number, it is null; a quick lag that one wrong reading shows has such an interval."""
+    time = 0.05 * np.arange(1200)
+    voltage = np.repeat([0.0, 1200.0, 400.0, 2100.0, 900.0, 0.0], 200)
+    relaxed = np.zeros(1200)
+    for row in range(1, 1200):
+        relaxed[row] = relaxed[row - 1] + (voltage[row - 1] - relaxed[row - 1]) * (1 - np.exp(-0.05 / 2))
+    reading = 100 + 0.06 * voltage + 0.24 * relaxed + np.random.default_rng(1).normal(0, 2, 1200)
+    reading[0] = 0
+    found = vsj.identify((time, voltage, reading))
+    assert [(tau.low, tau.high) for tau in found.nominal.tau_s] == [(0, np.inf)] * 2
+    assert "[0, inf] s" in repr(found)
+    assert json.loads(found.to_json())["nominal"]["tau_s"][0]["high"] is None
+
+
+def test_the_index_of_a_frame_is_a_column(sample):
+    expected = without_names(vsj.identify(SAMPLE).to_json())
+    frame = pandas.DataFrame(sample)
+    stamps = pandas.Timestamp("2026-01-31 23:59:30") + pandas.to_timedelta(frame["time_s"], unit="s")
+    unnamed = frame[["voltage_v", "stiffness"]].set_index(pandas.DatetimeIndex(stamps.to_numpy()))
+    assert without_names(vsj.identify(frame.set_index("time_s")).to_json()) == expected
+    with pytest.warns(vsj.RecordWarning, match="counted from the first row"):
+        assert without_names(vsj.identify(unnamed).to_json())["rows"] == expected["rows"]
+
+
 def test_frames_and_arrays_have_the_answer_of_the_file(sample):
     expected = without_names(vsj.identify(SAMPLE).to_json())
     arrays = tuple(sample[name] for name in ("time_s", "voltage_v", "stiffness"))

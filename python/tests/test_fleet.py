@@ -487,10 +487,11 @@ def test_a_plant_of_the_manifest_is_not_the_file_of_the_same_name_that_the_optio
     assert fleet.main([*words, "--effort", "quick"]) == 0
 
 
-def test_without_its_packages_the_command_says_what_to_install():
-    program = "import sys, runpy; sys.modules['distributed'] = None; runpy.run_module('vsj.fleet', run_name='__main__')"
+@pytest.mark.parametrize("package", ["distributed", "pyarrow"])
+def test_without_its_packages_the_command_says_what_to_install(package):
+    program = f"import sys, runpy; sys.modules['{package}'] = None; runpy.run_module('vsj.fleet', run_name='__main__')"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
-    assert done.returncode == 2 and done.stderr == "vsj.fleet: the package distributed is missing; expected: pip install './python[fleet]'\n"
+    assert done.returncode == 2 and done.stderr == f"vsj.fleet: the package {package} is missing; expected: pip install './python[fleet]'\n"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Answers as data classes. Their fields are those of the command's JSON; a field that the JSON leaves out has its default."""
 
 import json
+import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Dict, List, Optional, Union, get_args, get_origin, get_type_hints
 
@@ -22,6 +23,10 @@ def build(kind, value):
         return {key: build(inner[1], each) for key, each in value.items()}
     if not is_dataclass(kind):
         return value
+    if "low" in value and "high" in value:
+        # JSON has no infinite number: a bound that is none is null.
+        low, high = (infinite if value[end] is None else value[end] for end, infinite in (("low", -math.inf), ("high", math.inf)))
+        value = {**value, "low": low, "high": high}
     hints = _HINTS.get(kind) or _HINTS.setdefault(kind, get_type_hints(kind))
     return kind(**{it.name: build(hints[it.name], value[it.name]) for it in fields(kind) if it.init and it.name in value})
 

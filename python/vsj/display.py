@@ -1,7 +1,8 @@
 """Answers as a notebook and the prompt show them: a line of text, and a table in HTML."""
 
-import math
 from html import escape
+
+from . import _vsj
 
 
 def diagnosis_line(it):
@@ -12,7 +13,7 @@ def diagnosis_line(it):
 
 def diagnosis_html(it):
     """The verdict, and a table of the causes: probability, and size with 95 % interval."""
-    before, after = (_four_digits(quality.held_out_rmse) for quality in (it.baseline, it.extended))
+    before, after = (_vsj.number(quality.held_out_rmse) for quality in (it.baseline, it.extended))
     said = [f"<b>{escape(it.verdict)}</b>"]
     found = [("", finding) for finding in it.findings]
     found += [(f" in {record.name} only", finding) for record in it.records for finding in record.findings]
@@ -49,25 +50,9 @@ def plan_line(it):
 
 
 def quantity(it):
-    """A value with its 95 % interval and unit: two significant digits of the interval's half-width, as the command prints it."""
-    numbers = (it.value, it.low, it.high)
-    half = 0.5 * (it.high - it.low)
-    decimals = 1 - math.floor(math.log10(half)) if 0 < half < math.inf else None
-    if decimals is None or not -6 <= decimals <= 9 or max(map(abs, numbers)) >= 1e7:
-        value, low, high = map(_four_digits, numbers)
-    else:
-        value, low, high = (f"{number:.{max(decimals, 0)}f}" for number in numbers)
-    interval = "" if low == high else f" [{low}, {high}]"
-    return f"{value}{interval} {it.unit}".rstrip()
+    """A value with its 95 % interval and unit, as the command prints it."""
+    return " ".join(filter(None, (*_vsj.with_interval(it.value, it.low, it.high), it.unit)))
 
 
 def _sizes(finding):
     return "<br>".join(escape(f"{name} = {quantity(it)}") for name, it in finding.parameters.items())
-
-
-def _four_digits(value):
-    if value == 0 or not math.isfinite(value):
-        return f"{value:g}"
-    if not 1e-4 <= abs(value) < 1e7:
-        return f"{value:.3e}"
-    return f"{value:.{max(0, 3 - math.floor(math.log10(abs(value))))}f}"

@@ -42,7 +42,7 @@ def _record(data, name, options):
         return name.replace("DataFrame", "columns"), [(str(key), _cells(column)) for key, column in data.items()]
     columns = getattr(data, "columns", None)
     if columns is not None:
-        return name, [(str(column), _cells(data[column])) for column in columns]
+        return name, _index(data) + [(str(column), _cells(data[column])) for column in columns]
     if isinstance(data, np.ndarray) and data.dtype.names:
         return name.replace("DataFrame", "array"), [(column, _cells(data[column])) for column in data.dtype.names]
     if isinstance(data, tuple):
@@ -59,6 +59,16 @@ def _record(data, name, options):
     asked = (options["time"], options["voltage"], options["reading"] or options["column"])
     names = [_name(option, default) for option, default in zip(asked, CONTRACT)]
     return name.replace("DataFrame", "arrays"), list(zip(names, map(_cells, columns)))
+
+
+def _index(frame):
+    """The index of a pandas frame as a column, if it has a name, or times, which without a name are ``time``."""
+    index = getattr(frame, "index", None)
+    kind = getattr(getattr(index, "dtype", None), "kind", None)
+    name = getattr(index, "name", None)
+    if name is None and kind in ("M", "m"):
+        name = "time"
+    return [] if name is None or name in frame.columns else [(str(name), _cells(index))]
 
 
 def _bad_input(text):

@@ -21,5 +21,6 @@ pub(crate) struct Forwarded {
 pub(crate) fn replace(args: &[OsString]) -> Result<Infallible> {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(["run", "--quiet", "--package", "emulation", "--"]).args(args);
+    eprintln!("$ cargo run --quiet --package emulation");
     Err(command.exec()).context("cannot start cargo")
 }

@@ -20,6 +20,13 @@ In comes a folder or an object store with records, or a manifest that lists them
 | ``command`` | the command line |
 """
 
-from .store import read
-
 __all__ = ["read"]
+
+
+def __getattr__(name):
+    # Not imported above: `python -m vsj.fleet` imports this first, and says itself which package is missing.
+    if name == "read":
+        from .store import read
+
+        return read
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

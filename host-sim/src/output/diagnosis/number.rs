@@ -1,7 +1,7 @@
 //! Numbers and parameters as texts and pages show them.
 
 use identify::answer::{LinearError, Parameter};
-use identify::dimension::{Dimension, significant};
+use identify::dimension::{Dimension, significant, with_interval};
 use identify::record::scales::Scales;
 
 /// Formats a parameter with its interval and unit, and says so if it is extrapolated.
@@ -12,28 +12,6 @@ pub(super) fn interval(parameter: &Parameter, scales: &Scales) -> String {
     let words = [value, interval, scales.unit(dimension)];
     let words: Vec<String> = words.into_iter().filter(|word| !word.is_empty()).collect();
     words.join(" ") + extrapolated(parameter)
-}
-
-/// Formats a value and its interval, `[low, high]`, with two significant digits of the interval's half-width, and with four
-/// significant digits where it has no width or the numbers are of very different size. The interval is empty where its ends
-/// are one number then: the value is fixed, or known to all digits that are shown.
-pub(in crate::output) fn with_interval(numbers: [f64; 3]) -> (String, String) {
-    let [value, low, high] = rounded(numbers);
-    let interval = if low == high { String::new() } else { format!("[{low}, {high}]") };
-    (value, interval)
-}
-
-fn rounded([value, low, high]: [f64; 3]) -> [String; 3] {
-    let half = 0.5 * (high - low);
-    let decimals = 1 - half.log10().floor().clamp(-99.0, 99.0) as i32;
-    let large = value.abs().max(low.abs()).max(high.abs());
-    if !(half > 0.0 && half.is_finite() && (-6..=9).contains(&decimals) && large < 1e7) {
-        return [value, low, high].map(number);
-    }
-    let decimals = decimals.max(0) as usize;
-    // What rounds to zero has no sign.
-    let zero = 0.5 * 10f64.powi(-(decimals as i32));
-    [value, low, high].map(|it| format!("{:.decimals$}", if it.abs() < zero { 0.0 } else { it }))
 }
 
 /// The words after a parameter that is the value of a curve where the record has not been.
@@ -62,19 +40,6 @@ pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scale
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn digits_follow_the_width_of_the_interval() {
-        for (numbers, value, interval) in [
-            ([1.200_031, 1.199_874, 1.200_188], "1.20003", "[1.19987, 1.20019]"),
-            ([-70.6, -90.0, -51.2], "-71", "[-90, -51]"),
-            ([645.653, 645.4621, 645.844], "645.65", "[645.46, 645.84]"),
-            ([0.001, -0.01, 0.012], "0.001", "[-0.010, 0.012]"),
-            ([1e-12, 9e-13, 1.1e-12], "1.000e-12", "[9.000e-13, 1.100e-12]"),
-        ] {
-            assert_eq!(with_interval(numbers), (value.to_owned(), interval.to_owned()));
-        }
-    }
 
     #[test]
     fn an_interval_whose_ends_are_shown_alike_is_not_shown() {

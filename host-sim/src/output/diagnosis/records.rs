@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use identify::answer::{Finding, RecordReport};
+use identify::dimension::Dimension;
 use identify::record::scales::Scales;
 use maud::{Markup, html};
 
@@ -17,23 +18,35 @@ pub(super) fn text(records: &[RecordReport], scales: &Scales) -> String {
         return text;
     }
     let width = records.iter().map(|of| of.name.chars().count()).max().unwrap_or(0).max(6);
+    let [rows, offset, sigma, rmse] = columns(scales);
+    let [offsets, sigmas, rmses] = [&offset, &sigma, &rmse].map(|name| name.chars().count().max(10));
     let _ = writeln!(
         text,
-        "\n{:width$} {:>7} {:>12} {:>10} {:>10}   in this record only",
-        "record", "rows", "zero offset", "noise", "RMSE"
+        "\n{:width$} {rows:>7} {offset} {sigma:>sigmas$} {rmse:>rmses$}   in this record only",
+        "record"
     );
     for of in records {
         let numbers = [of.offset, of.sigma, of.rmse].map(number);
         let [offset, sigma, rmse] = &numbers;
         let only = only(of, scales).join("; ");
-        let _ = writeln!(text, "{:width$} {:>7} {offset:>12} {sigma:>10} {rmse:>10}   {only}", of.name, of.rows);
+        let _ = writeln!(
+            text,
+            "{:width$} {:>7} {offset:>offsets$} {sigma:>sigmas$} {rmse:>rmses$}   {only}",
+            of.name, of.rows
+        );
     }
     text
 }
 
+/// Names of the columns of numbers, with the reading's unit.
+fn columns(scales: &Scales) -> [String; 4] {
+    let unit = scales.unit(Dimension::ReadingSize);
+    ["rows".into(), format!("zero offset [{unit}]"), format!("noise [{unit}]"), format!("RMSE [{unit}]")]
+}
+
 /// The section of the page; empty for a single record.
 pub(super) fn section(records: &[RecordReport], scales: &Scales) -> Markup {
-    let columns = ["rows", "zero offset", "noise", "RMSE"];
+    let columns = columns(scales);
     let table = columns.iter().fold(Table::default().column("record", ""), |table, name| table.column(name, "number"));
     let mut table = table.column("in this record only", "");
     for of in records {
@@ -70,7 +83,6 @@ mod tests {
     use super::*;
     use identify::Verdict;
     use identify::answer::Parameter;
-    use identify::dimension::Dimension;
 
     #[test]
     fn a_fault_is_listed_with_its_record() {
@@ -105,8 +117,8 @@ mod tests {
         let scales = Scales::default();
         let text = text(&[of("a.csv", Vec::new()), of("second.csv", vec![finding])], &scales);
         let lines: Vec<&str> = text.lines().skip(1).collect();
-        assert_eq!(lines[0], "record        rows  zero offset      noise       RMSE   in this record only");
-        assert_eq!(lines[1], "a.csv          500       -8.000     0.5000     0.5000   none");
+        assert_eq!(lines[0], "record        rows zero offset [V]  noise [V]   RMSE [V]   in this record only");
+        assert_eq!(lines[1], "a.csv          500          -8.000     0.5000     0.5000   none");
         assert!(lines[2].ends_with("   sensor-saturation (limit = 380.00 [379.90, 380.10] V)"), "{text}");
         assert!(section(&[], &scales).into_string().is_empty());
     }

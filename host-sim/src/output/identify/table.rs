@@ -1,9 +1,10 @@
 //! The rows of the table of quantities, for the terminal and for the page.
 
+use identify::dimension::with_interval;
 use identify::nominal::report::{InputLaw, Quantity, Report};
 use simulation::units::Units;
 
-use crate::output::diagnosis::number::{number, with_interval};
+use crate::output::diagnosis::number::number;
 
 /// A quantity as it is shown: name, value with unit, interval.
 pub(super) type Line = [String; 3];

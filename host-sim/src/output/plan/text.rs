@@ -7,6 +7,8 @@ use simulation::bad_input::number as exact;
 use crate::output::cells::line;
 use crate::output::diagnosis::number::number;
 
+/// Highest voltage of an amplifier that the controller can have, in V.
+const MOST_V: f64 = 1000.0;
 /// Largest number of parts that are listed.
 const MOST_PARTS: usize = 45;
 /// Largest number of pairs of which each is listed.
@@ -51,17 +53,23 @@ pub fn text(plan: &Plan) -> String {
     text
 }
 
-/// The command lines that play the schedule, then diagnose both records.
+/// The command lines that play the schedule, as far as they can, then diagnose both records.
 pub fn how_to_play(plan: &Plan) -> String {
     let Some(schedule) = &plan.schedule else {
         return "With --out DIR the schedule is written for `vsj stair --input` and `vsj link PORT record --input`.\n"
             .into();
     };
     let [low_v, high_v] = plan.range_v;
+    if low_v < 0.0 || high_v > MOST_V {
+        return format!(
+            "Measured:  {schedule} with your own voltage source: `vsj stair` and `vsj link` reach 0 to {} V\n\
+             Then:      vsj diagnose next.csv\n",
+            exact(MOST_V)
+        );
+    }
     let most = if high_v > 700.0 { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
-    let least = if low_v < 0.0 { format!(" --min-v {}", exact(low_v)) } else { String::new() };
     format!(
-        "Simulated: vsj stair --input {schedule} --controller none{most}{least}\n\
+        "Simulated: vsj stair --input {schedule} --controller none{most}\n\
          Measured:  vsj link PORT record next.csv --input {schedule} --arm\n\
          Then:      vsj diagnose next.csv\n"
     )
@@ -114,4 +122,34 @@ fn of_interval(it: &Sharper) -> String {
     let name = format!("{} {}", it.cause, it.parameter);
     let now = it.now.map_or_else(|| "-".to_owned(), number);
     format!("{name:<38}  {now:<12}  {} {}", number(it.planned), it.unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_commands_that_can_play_the_schedule_are_named() {
+        let plan = |low_v, high_v| Plan {
+            schedule: Some("schedule.csv".into()),
+            decides: Vec::new(),
+            probability: None,
+            minutes: 1.0,
+            range_v: [low_v, high_v],
+            suspects: Vec::new(),
+            separations: Vec::new(),
+            parts: Vec::new(),
+            intervals: Vec::new(),
+            commands: Vec::new(),
+            responses: Vec::new(),
+            reading_unit: "V".into(),
+            remarks: Vec::new(),
+        };
+        assert!(how_to_play(&plan(0.0, 700.0)).contains("vsj stair --input schedule.csv --controller none\n"));
+        assert!(how_to_play(&plan(0.0, 1000.0)).contains("--controller none --limit-v 1000\n"));
+        for [low_v, high_v] in [[0.0, 2100.0], [-100.0, 700.0]] {
+            let text = how_to_play(&plan(low_v, high_v));
+            assert!(text.starts_with("Measured:  schedule.csv with your own voltage source"), "{text}");
+        }
+    }
 }
