@@ -52,6 +52,8 @@ const LANES: Lanes = Lanes {
         ),
         Step::xtask("python", &["python", "--only", "test"]),
         Step::emulation("firmware", &["proof"]),
+        // Of the images with 16 KB of RAM the one that needs most.
+        Step::emulation("size", &["size", "--feedback", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("boot", &["boot"]),
         Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("clients", &["clients"]),
