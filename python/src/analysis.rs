@@ -115,7 +115,8 @@ pub(crate) fn diagnose<'py>(
         rows.iter().try_for_each(|record| records.input.check(record))?;
         let units = records.measured[0].units.clone();
         let options = Options { units, input: records.input, effort, stop, ..Options::default() };
-        let of_file = |options: Options, plant: String, file| anyhow::Ok(Options { plant, base: Base::new(file)?, ..options });
+        let of_file =
+            |options: Options, plant: String, file| anyhow::Ok(Options { plant, base: Base::new(file)?, ..options });
         let options = match plant {
             Plant::Named(name) if name == "identify" => {
                 let identified = ::identify::identify(&rows, records.input, &options.units)?;
