@@ -23,7 +23,7 @@ use crate::request::Request;
 /// The same type is used from the [`Server`](crate::Server) through the firmware's mailbox to the control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Command {
-    /// True if at least one accepted or repeated frame has arrived since the last tick.
+    /// True if a request that ends the host's silence has been accepted since the last tick; a repeated one does not end it.
     pub heard: bool,
     /// Transition that the supervisor is to make. In the faulted state, `Disarm` acknowledges the fault.
     pub arming: Option<supervisor::Command>,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mcap::records::op;
 use record_files::{Cell, Column, Container, Sheet, Writer, open, read};
 use simulation::BadInput;
 use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
@@ -241,4 +242,20 @@ fn files_are_recognised_by_their_first_bytes() {
         }
     }
     assert!(open(folder.path(), &Format::default(), None).unwrap_err().to_string().contains("cannot be read"));
+}
+
+/// The library would reserve up to 4 GiB for it, which ends the program where there is less.
+#[test]
+fn a_text_longer_than_its_record_is_damage_and_takes_no_memory() {
+    let long = u32::MAX.to_le_bytes().to_vec();
+    for (opcode, body) in [
+        (op::SCHEMA, [vec![0; 2], long.clone()].concat()),
+        (op::CHANNEL, [vec![0; 8], long.clone()].concat()),
+        (op::CHANNEL, [vec![0; 12], 4u32.to_le_bytes().to_vec(), long.clone()].concat()),
+        (op::CHUNK, [vec![0; 28], long].concat()),
+    ] {
+        let length = (body.len() as u64).to_le_bytes();
+        let error = message(Container::Mcap, [mcap::MAGIC, &[opcode], &length, &body].concat(), &Format::default());
+        assert!(error.contains("a text that is longer than its record"), "{opcode}: {error}");
+    }
 }

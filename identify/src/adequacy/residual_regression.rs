@@ -89,6 +89,8 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
         significant: z > Z_RARE,
         doubtful: z > Z_DOUBTFUL,
     };
+    // The largest of what a long record needs, as is the spectrum.
+    drop((groups, own));
     Some(spectral_line(data, fit, &target, found))
 }
 

@@ -483,10 +483,12 @@ impl Problem {
                 break;
             }
             let poles = self.moved(&fit.poles, &step);
-            let tried = self.fit(poles);
-            if tried.cost < fit.cost {
-                let little = fit.cost - tried.cost <= least * fit.cost;
-                fit = self.linearised(tried.poles);
+            // Without its columns, and those of the last fit: of many rows they are large.
+            let Fit { poles, cost, .. } = self.fit(poles);
+            if cost < fit.cost {
+                let little = fit.cost - cost <= least * fit.cost;
+                drop(fit);
+                fit = self.linearised(poles);
                 (damping, rejected) = (0.1 * damping, 0);
                 if little {
                     break;

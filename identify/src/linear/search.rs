@@ -35,13 +35,14 @@ const PEAKS: usize = 4;
 /// Relative reduction of the cost below which a refinement ends: of a quick one, of one on part of the rows, and of the last one.
 const LEAST: (f64, f64, f64) = (1e-3, 1e-5, 1e-13);
 
-/// Fits the best models of order 0 to [`LARGEST_ORDER`], as far as the readings allow.
-pub fn best_of_each_order(problem: &Problem) -> Vec<Fit> {
+/// The best models of order 0 to [`LARGEST_ORDER`], as far as the readings allow.
+pub fn best_of_each_order(problem: &Problem) -> impl Iterator<Item = Fit> {
     best_up_to(problem, LARGEST_ORDER)
 }
 
-/// Fits the best models of order 0 to `largest`, as far as the readings allow.
-pub fn best_up_to(problem: &Problem, largest: usize) -> Vec<Fit> {
+/// The best models of order 0 to `largest`, as far as the readings allow. Each is fitted to all rows when it is asked for, as a fit of
+/// many rows is large.
+pub fn best_up_to(problem: &Problem, largest: usize) -> impl Iterator<Item = Fit> {
     let part = (problem.rows() > ROWS_TO_SEARCH).then(|| problem.part(ROWS_TO_SEARCH, PIECES_TO_SEARCH));
     let searched = part.as_ref().unwrap_or(problem);
     let mut found: Vec<Vec<Poles>> = Vec::new();
@@ -53,13 +54,10 @@ pub fn best_up_to(problem: &Problem, largest: usize) -> Vec<Fit> {
         found.push(best(searched, starts(searched, order, &found)));
     }
     let (steps, least) = if part.is_some() { STEPS_ON_ALL } else { (STEPS.1, LEAST.2) };
-    found
-        .into_iter()
-        .map(|models| {
-            let first = models.into_iter().next().expect("a best model");
-            problem.refined(problem.within(first), steps, least)
-        })
-        .collect()
+    found.into_iter().map(move |models| {
+        let first = models.into_iter().next().expect("a best model");
+        problem.refined(problem.within(first), steps, least)
+    })
 }
 
 /// Refines the most promising starts; returns the best models, the best first.

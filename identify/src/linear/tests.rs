@@ -94,7 +94,7 @@ const RESONATOR: Truth = Truth {
 
 fn best(record: &Record, order: usize) -> (Problem, Fit) {
     let problem = Problem::new(vec![Series::new(record, Input::Hold)]);
-    let fit = best_of_each_order(&problem).swap_remove(order);
+    let fit = best_of_each_order(&problem).nth(order).unwrap();
     (problem, fit)
 }
 
@@ -157,7 +157,7 @@ fn models_scale_with_the_units() {
     let record = measured(&LAG, &even_times(rows, 0.2), &levels(rows, 9), &scaled(normals(rows), 0.5));
     let fits = |record: &Record| {
         let problem = Problem::new(vec![Series::new(record, Input::Hold)]);
-        let fits = best_of_each_order(&problem);
+        let fits: Vec<Fit> = best_of_each_order(&problem).collect();
         let held_out: Vec<f64> = fits.iter().map(|fit| root_mean_square(&held_out_residual(&problem, fit))).collect();
         (fits, held_out)
     };
@@ -229,7 +229,7 @@ fn several_records_share_the_spring_but_neither_zero_nor_start() {
         measured(&truth[which], &even_times(rows, 0.2), &levels(rows, 9), &noise)
     });
     let problem = Problem::new(records.iter().map(|record| Series::new(record, Input::Hold)).collect());
-    let fit = best_of_each_order(&problem).swap_remove(1);
+    let fit = best_of_each_order(&problem).nth(1).unwrap();
     near(fit.gain(), 0.7, 0.003);
     near(problem.zero(&fit, 0), 20.0, 0.02);
     near(problem.zero(&fit, 1), -3.0, 0.1);

@@ -128,7 +128,7 @@ impl Models {
             let held_out = held_out_residual(&problem, &fit);
             Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
-        let fits: Vec<Model> = best_of_each_order(&problem).into_iter().map(with_errors).collect();
+        let fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
         let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
         let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
         Self { law, problem, fits, chosen }
@@ -224,7 +224,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let full_scale = series.iter().map(Series::full_scale).fold(0.0, f64::max);
     let squared: Vec<Series> = series.iter().map(|series| series.squared(full_scale)).collect();
     let (order, best) = models.fits.iter().enumerate().take(2).next_back().expect("a model of order 0");
-    if best_up_to(&Problem::new(squared.clone()), order)[order].cost < best.fit.cost {
+    if best_up_to(&Problem::new(squared.clone()), order).last().expect("a model of order 0").cost < best.fit.cost {
         let square = Models::of(squared, InputLaw::Square);
         if square.held_out_rmse() < most * models.held_out_rmse() {
             models = square;
@@ -251,7 +251,7 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
         return None;
     }
     let problem = Problem::new(records.iter().map(|record| Series::new(record, input)).collect());
-    let fits = best_of_each_order(&problem).into_iter().enumerate().skip(1);
+    let fits = best_of_each_order(&problem).enumerate().skip(1);
     let with_error = |(order, fit): (usize, Fit)| (order, held_out_residual(&problem, &fit), fit);
     let square = |of: &[f64]| dot(of, of);
     let (order, held_out, fit) = fits.map(with_error).min_by(|a, b| square(&a.1).total_cmp(&square(&b.1)))?;

@@ -449,6 +449,7 @@ mod tests {
     use super::reciprocal;
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_reciprocal_is_that_of_a_long_division() {
         let ends = [1 << 29, (1 << 29) + 1, (1 << 30) - 1, (1 << 30) - (1 << 14), (1 << 29) + (1 << 14) - 1];
         for mantissa in ((1 << 29)..(1 << 30)).step_by(997).chain(ends) {

@@ -55,7 +55,7 @@ const CAUSES: usize = Cause::ALL.len();
 /// Number of vectors that one tick whitens.
 const WHITENED: usize = 25;
 /// Largest whitened value, in standard deviations with 10 fraction bits: the products of two of them in all blocks fit 64 bits.
-const LARGEST: i32 = (1 << 24) - 1;
+const LARGEST: i32 = i32::MAX >> 7;
 
 /// What the bank says of the spring and its sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

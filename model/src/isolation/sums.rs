@@ -246,6 +246,7 @@ mod tests {
     use super::quotient;
 
     #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_quotient_of_two_short_divisions_is_that_of_a_long_one() {
         assert_eq!(quotient(i64::MAX >> 20, 0), 0);
         let mut bits = 7u32;

@@ -1,14 +1,15 @@
 //! The messages of an MCAP file in their order, up to the end of the file or to where it was cut off.
 //!
-//! Chunks are decompressed here, whole and up to their stated size, by decoders that are written in Rust.
+//! Chunks are decompressed here, whole and up to their stated size, by decoders that are written in Rust. The library is given only
+//! records that are read here, none with a text that is longer than the record: it would reserve up to 4 GiB for each.
 
 use std::borrow::Cow;
 use std::io::Read;
 
 use anyhow::Result;
-use mcap::read::{ChannelAccumulator, LinearReader};
-use mcap::records::{ChunkHeader, Record};
-use mcap::{Channel, McapError, parse_record};
+use mcap::read::ChannelAccumulator;
+use mcap::records::{ChunkHeader, Record, op};
+use mcap::{Channel, MAGIC, McapError, parse_record};
 use simulation::csv_table::text::MOST_BYTES;
 use simulation::{BadInput, bad_input};
 
@@ -30,18 +31,16 @@ pub(super) fn each_message(
     each: impl FnMut(&Message<'_>) -> Result<()>,
 ) -> Result<Option<McapError>> {
     let mut messages = Messages { name, linked: ChannelAccumulator::default(), count: 0, each };
-    let file = LinearReader::new(bytes).map_err(|error| messages.damaged(&error))?;
-    for record in file {
-        match record {
+    let Some(mut rest) = bytes.strip_prefix(MAGIC) else { return Err(messages.damaged(&McapError::BadMagic).into()) };
+    loop {
+        match next(&mut rest, bytes.len()) {
             // What follows repeats what has been read.
-            Ok(Record::DataEnd(_)) => return Ok(None),
-            Ok(Record::Chunk { header, data }) => messages.chunk(&header, &data)?,
-            Ok(record) => messages.record(record)?,
+            Ok((op::DATA_END | op::FOOTER, _)) => return Ok(None),
+            Ok((opcode, body)) => messages.record(opcode, body)?,
             Err(error @ McapError::UnexpectedEof) if messages.count > 0 => return Ok(Some(error)),
             Err(error) => return Err(messages.damaged(&error).into()),
         }
     }
-    Ok(None)
 }
 
 struct Messages<'a, F> {
@@ -54,14 +53,58 @@ struct Messages<'a, F> {
 /// Bytes before the content of a record in a chunk: its kind and its length.
 const HEAD: usize = 9;
 
+/// The kind and the content of the next record of `rest`, which has at most `most` bytes.
+fn next<'a>(rest: &mut &'a [u8], most: usize) -> Result<(u8, &'a [u8]), McapError> {
+    let (&[opcode, ref length @ ..], after) = rest.split_first_chunk::<HEAD>().ok_or(McapError::UnexpectedEof)?;
+    let len = u64::from_le_bytes(*length);
+    let length = usize::try_from(len).ok().filter(|length| *length <= most);
+    let length = length.ok_or(McapError::RecordTooLarge { opcode, len })?;
+    let (body, next) = after.split_at_checked(length).ok_or(McapError::UnexpectedEof)?;
+    *rest = next;
+    Ok((opcode, body))
+}
+
+/// `None` if a text of a record is longer than the record.
+fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
+    let skip = |rest: &mut &[u8]| {
+        let (length, after) = rest.split_first_chunk()?;
+        *rest = after.get(usize::try_from(u32::from_le_bytes(*length)).ok()?..)?;
+        Some(())
+    };
+    let (numbers, texts) = match opcode {
+        op::SCHEMA => (2, 2),
+        op::CHANNEL => (4, 2),
+        op::CHUNK => (28, 1),
+        _ => return Some(()),
+    };
+    let mut rest = body.get(numbers..)?;
+    (0..texts).try_for_each(|_| skip(&mut rest))?;
+    if opcode == op::CHANNEL {
+        // Keys and values.
+        let (length, after) = rest.split_first_chunk()?;
+        rest = after.get(..usize::try_from(u32::from_le_bytes(*length)).ok()?)?;
+        while !rest.is_empty() {
+            skip(&mut rest)?;
+        }
+    }
+    Some(())
+}
+
 impl<F: FnMut(&Message<'_>) -> Result<()>> Messages<'_, F> {
     fn damaged(&self, error: &impl std::fmt::Display) -> BadInput {
         let (name, count) = (self.name, self.count);
         BadInput(format!("{name}, after message {count}: {error}; expected an MCAP file"))
     }
 
-    fn record(&mut self, record: Record<'_>) -> Result<()> {
-        match record {
+    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<()> {
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK) {
+            return Ok(());
+        }
+        if check_texts(opcode, body).is_none() {
+            return Err(self.damaged(&"a text that is longer than its record").into());
+        }
+        match parse_record(opcode, body).map_err(|error| self.damaged(&error))? {
+            Record::Chunk { header, data } => self.chunk(&header, &data)?,
             Record::Schema { header, data } => {
                 let data = Cow::Owned(data.into_owned());
                 self.linked.add_schema(header, data).map_err(|error| self.damaged(&error))?;
@@ -88,14 +131,13 @@ impl<F: FnMut(&Message<'_>) -> Result<()>> Messages<'_, F> {
             return Err(self.damaged(&McapError::BadChunkCrc { saved: header.uncompressed_crc, calculated }).into());
         }
         let mut rest: &[u8] = &content;
-        while let Some((head, after)) = rest.split_first_chunk::<HEAD>() {
-            let &[opcode, ref length @ ..] = head;
-            let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
-            let Some((body, next)) = after.split_at_checked(length) else { break };
-            self.record(parse_record(opcode, body).map_err(|error| self.damaged(&error))?)?;
-            rest = next;
+        while !rest.is_empty() {
+            let (opcode, body) = next(&mut rest, usize::MAX).map_err(|_| self.damaged(&McapError::UnexpectedEoc))?;
+            if opcode != op::CHUNK {
+                self.record(opcode, body)?;
+            }
         }
-        if rest.is_empty() { Ok(()) } else { Err(self.damaged(&McapError::UnexpectedEoc).into()) }
+        Ok(())
     }
 
     fn decompressed<'d>(&self, header: &ChunkHeader, data: &'d [u8]) -> Result<Cow<'d, [u8]>> {

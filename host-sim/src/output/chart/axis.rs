@@ -3,6 +3,9 @@
 /// Part of the range of the values by which the axis extends beyond them.
 const MARGIN: f64 = 0.04;
 
+/// Smallest length of an axis, whose steps are still normal numbers.
+const SHORTEST: f64 = 1e-300;
+
 /// An axis from its lowest to its highest value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
@@ -17,9 +20,9 @@ impl Axis {
         if low > high {
             return Self { low: 0.0, high: 1.0 };
         }
-        // One value alone is drawn in the middle.
-        let alone = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
-        if low == high { Self { low: low - alone, high: high + alone } } else { Self { low, high } }
+        // Values that are equal, or nearer to each other than a step can be, are drawn in the middle.
+        let alone = if low.abs() < SHORTEST { 1.0 } else { 0.1 * low.abs() };
+        if high - low < SHORTEST { Self { low: low - alone, high: high + alone } } else { Self { low, high } }
     }
 
     /// An axis that extends slightly beyond the values at both ends, whatever the ticks are.
@@ -146,6 +149,9 @@ mod tests {
             (0.0, 7e6),
             (101_325.0, 101_325.02),
             (1_767_225_600.0, 1_767_225_605.0),
+            (5e-324, 5e-324),
+            (-5e-324, 1e-320),
+            (1e-308, 2e-308),
         ] {
             let labels = labels(Axis::beyond([low, high].into_iter()), 7);
             assert!((1..=7).contains(&labels.len()), "{low} to {high}: {labels:?}");
