@@ -39,6 +39,9 @@ impl Amplifier {
     /// The source report's range: 0 to 700 V, from the 12-bit converter of the MCU.
     pub const PAPER: Self = Self::up_to(700.0);
 
+    /// Largest `full_scale_v` of any amplifier, in V.
+    pub const MOST_V: f64 = 1000.0;
+
     /// Returns an amplifier of 0 V to `full_scale_v` behind a 12-bit converter, without a slew limit.
     pub const fn up_to(full_scale_v: f64) -> Self {
         Self { full_scale_v, min_v: 0.0, max_v: full_scale_v, slew_v_per_s: None, dac_bits: 12 }
@@ -70,7 +73,7 @@ impl Amplifier {
 impl Validate for Amplifier {
     fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
         let Self { full_scale_v, min_v, max_v, slew_v_per_s, dac_bits } = *self;
-        OutOfRange::check("full_scale_v", full_scale_v, 50.0..=1000.0, "V")?;
+        OutOfRange::check("full_scale_v", full_scale_v, 50.0..=Self::MOST_V, "V")?;
         OutOfRange::check("dac_bits", f64::from(dac_bits), 8.0..=16.0, "bits")?;
         OutOfRange::check("min_v", min_v, 0.0..=full_scale_v - 10.0, "V")?;
         OutOfRange::check("max_v", max_v, min_v + 10.0..=full_scale_v, "V")?;

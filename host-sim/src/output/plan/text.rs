@@ -2,13 +2,12 @@
 
 use identify::plan::Plan;
 use identify::plan::answer::{Part, Separation, Sharper, Suspected};
+use model::Amplifier;
 use simulation::bad_input::number as exact;
 
 use crate::output::cells::line;
 use crate::output::diagnosis::number::number;
 
-/// Highest voltage of an amplifier that the controller can have, in V.
-const MOST_V: f64 = 1000.0;
 /// Largest number of parts that are listed.
 const MOST_PARTS: usize = 45;
 /// Largest number of pairs of which each is listed.
@@ -60,14 +59,14 @@ pub fn how_to_play(plan: &Plan) -> String {
             .into();
     };
     let [low_v, high_v] = plan.range_v;
-    if low_v < 0.0 || high_v > MOST_V {
+    if low_v < 0.0 || high_v > Amplifier::MOST_V {
         return format!(
             "Measured:  {schedule} with your own voltage source: `vsj stair` and `vsj link` reach 0 to {} V\n\
              Then:      vsj diagnose next.csv\n",
-            exact(MOST_V)
+            exact(Amplifier::MOST_V)
         );
     }
-    let most = if high_v > 700.0 { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
+    let most = if high_v > Amplifier::PAPER.max_v { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
     format!(
         "Simulated: vsj stair --input {schedule} --controller none{most}\n\
          Measured:  vsj link PORT record next.csv --input {schedule} --arm\n\
