@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use identify::nominal::Identified;
-use identify::plant::base::Base;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input;
@@ -169,13 +168,10 @@ pub fn diagnose(records: &Records, files: &[u8], stop: &Stop, progress: &mut dyn
     read.records.iter().try_for_each(|record| read.input.check(record))?;
     let options =
         Options { units: read.units.clone(), input: read.input, effort, stop: stop.clone(), ..Options::default() };
-    let of_file = |options: Options, plant: &str, file| {
-        anyhow::Ok(Options { plant: plant.to_owned(), base: Base::new(file)?, ..options })
-    };
     let options = match records.plant.as_str() {
         "identify" => options.judging(read.identify()?)?,
-        "paper" => of_file(options, "paper", plant_file::load_for_host("paper")?)?,
-        text => of_file(options, "plant.toml", plant_file::parse_for_host("plant.toml", text)?)?,
+        "paper" => options.judging_file("paper", plant_file::load_for_host("paper")?)?,
+        text => options.judging_file("plant.toml", plant_file::parse_for_host("plant.toml", text)?)?,
     };
     read.remarks.extend(options.remark());
     let found = examine_several(&read.records, &options, |causes| {

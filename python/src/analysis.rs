@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ::identify::plan::{Basis, Request};
-use ::identify::plant::base::Base;
 use ::identify::{Diagnosis, Effort, Input, Options, Stop, examine_several};
 use anyhow::Result;
 use numpy::{IntoPyArray, PyArray1};
@@ -115,15 +114,13 @@ pub(crate) fn diagnose<'py>(
         rows.iter().try_for_each(|record| records.input.check(record))?;
         let units = records.measured[0].units.clone();
         let options = Options { units, input: records.input, effort, stop, ..Options::default() };
-        let of_file =
-            |options: Options, plant: String, file| anyhow::Ok(Options { plant, base: Base::new(file)?, ..options });
         let options = match plant {
             Plant::Named(name) if name == "identify" => {
                 let identified = ::identify::identify(&rows, records.input, &options.units)?;
                 options.judging(identified)?
             }
-            Plant::Named(name) => of_file(options, name.clone(), plant_file::load_for_host(&name)?)?,
-            Plant::Text((name, text)) => of_file(options, name.clone(), plant_file::parse_for_host(&name, &text)?)?,
+            Plant::Named(name) => options.judging_file(&name, plant_file::load_for_host(&name)?)?,
+            Plant::Text((name, text)) => options.judging_file(&name, plant_file::parse_for_host(&name, &text)?)?,
         };
         records.remarks.extend(options.remark());
         let found = examine_several(&rows, &options, |_| {})?;

@@ -11,7 +11,6 @@ use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
 use host_sim::output::terminal::{json, print, print_error, remark, wrote};
 use host_sim::signals::on_ctrl_c;
-use identify::plant::base::Base;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
 use indicatif::{ProgressBar, ProgressStyle};
 use simulation::plant_file;
@@ -84,9 +83,7 @@ impl Arguments {
                 let identified = identify(records, input, &options.units)?;
                 options.judging(identified)
             }
-            plant => {
-                Ok(Options { plant: plant.to_owned(), base: Base::new(plant_file::load_for_host(plant)?)?, ..options })
-            }
+            plant => options.judging_file(plant, plant_file::load_for_host(plant)?),
         }
     }
 

@@ -1,6 +1,7 @@
 //! The options of a diagnosis.
 
 use anyhow::Result;
+use simulation::plant_file::PlantFile;
 use simulation::units::Units;
 
 use crate::fit::budget::Effort;
@@ -31,13 +32,21 @@ pub struct Options {
 }
 
 impl Options {
+    /// Returns the options for a diagnosis of a simulation: its plant file, and the name of that for the report.
+    ///
+    /// # Errors
+    /// Those of [`Base::new`].
+    pub fn judging_file(self, name: &str, file: PlantFile) -> Result<Self> {
+        Ok(Self { plant: name.to_owned(), base: Base::new(file)?, ..self })
+    }
+
     /// Returns the options for a diagnosis of what was identified from the same records.
     ///
     /// # Errors
     /// Those of [`Base::new`].
     pub fn judging(self, identified: Identified) -> Result<Self> {
         let Identified { plant, settled, linear, .. } = identified;
-        Ok(Self { plant: "identify".into(), base: Base::new(plant)?, unsettled: !settled, linear, ..self })
+        Self { unsettled: !settled, linear, ..self }.judging_file("identify", plant)
     }
 
     /// Returns what the user should know who compares readings of another quantity with the paper's spring: its gain and zero are no
