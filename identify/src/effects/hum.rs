@@ -10,6 +10,7 @@ use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::record::data::Data;
 use crate::record::spectrum::{self, Peak};
+use crate::stats::scale::centred;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LINE_TO_NEIGHBOURS};
 
@@ -32,14 +33,12 @@ const MULTIPLES: [f64; 3] = [1.0, 2.0, 3.0];
 /// Part of the voltage's mean square in a sine from which the voltage is one. Half a period more or less in the record leaves 0.4 of it.
 const PART_OF_SINE: f64 = 0.25;
 
-/// Returns true if a frequency is one at which the voltage drives the spring, or a multiple of it: no record can tell a disturbance from
-/// the response there.
-fn is_driven(frequency_hz: f64, data: &Data) -> bool {
-    let mean = data.voltage_v.iter().sum::<f64>() / data.rows() as f64;
-    let voltage: Vec<f64> = data.voltage_v.iter().map(|voltage| voltage - mean).collect();
+/// Returns true if a frequency is one at which the voltage, less its mean, drives the spring, or a multiple of it: no record can tell a
+/// disturbance from the response there.
+fn is_driven(frequency_hz: f64, voltage: &[f64], data: &Data) -> bool {
     MULTIPLES.iter().any(|multiple| {
-        let line = spectrum::line(&voltage, data, frequency_hz / multiple);
-        0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(&voltage, &voltage)
+        let line = spectrum::line(voltage, data, frequency_hz / multiple);
+        0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(voltage, voltage)
     })
 }
 
@@ -113,10 +112,11 @@ impl Effect for Hum {
             let each = std::iter::once(peak).chain(further).flat_map(|it| [scale * it.cosine, scale * it.sine]);
             std::iter::once(peak.frequency_hz).chain(each).collect()
         };
+        let voltage = centred(&data.voltage_v);
         peaks
             .into_iter()
             .filter(|peak| peak.frequency_hz > FEWEST_PERIODS.get() / data.duration_s())
-            .filter(|peak| !is_driven(peak.frequency_hz, data))
+            .filter(|peak| !is_driven(peak.frequency_hz, &voltage, data))
             .map(start)
             .collect()
     }

@@ -20,7 +20,7 @@ pub(super) fn relaxes_from_earlier_input(time_s: &[f64], voltage_v: &[f64], read
     }
     let tau_s = REFERENCE_TIME_CONSTANT_S;
     let short = rest < FEWEST_ROWS_AT_REST.count() || time_s[rest - 1] - time_s[0] < SHORT_REST.get() * tau_s;
-    DECAY_TIMES.iter().any(|times| decays(&time_s[..rest], reading, short.then_some(zero), times * tau_s))
+    decays(&time_s[..rest], reading, short.then_some(zero), DECAY_TIMES.iter().map(|times| times * tau_s))
 }
 
 /// Returns true if there are readings enough before the first voltage and none of them shows a decay. A decay so slow that they cannot
@@ -32,28 +32,30 @@ pub(crate) fn starts_at_rest(time: &[f64], voltage: &[f64], reading: &[f64]) -> 
     }
     let length = time[rest - 1] - time[0];
     let halves = std::iter::successors(Some(LONGEST_DECAY * length), |tau| Some(0.5 * tau));
-    let mut longer_than_a_row = halves.take_while(|tau| *tau > length / rest as f64);
-    !longer_than_a_row.any(|tau| decays(&time[..rest], reading, None, tau))
+    !decays(&time[..rest], reading, None, halves.take_while(|tau| *tau > length / rest as f64))
 }
 
 fn rows_before_voltage(voltage: &[f64]) -> usize {
     voltage.iter().take_while(|voltage| **voltage == 0.0).count()
 }
 
-/// Returns true if the first readings, one for each of `time`, contain an exponential decay with about the time constant `tau`, to
+/// Returns true if the first readings, one for each of `time`, contain an exponential decay with about one of the time constants, to
 /// `zero` or, without one, to any value.
-fn decays(time: &[f64], reading: &[f64], zero: Option<f64>, tau: f64) -> bool {
+fn decays(time: &[f64], reading: &[f64], zero: Option<f64>, mut time_constants: impl Iterator<Item = f64>) -> bool {
     let at_rest = &reading[..time.len()];
     let from_row_to_row = robust_scale(&second_differences(reading).collect::<Vec<_>>());
-    let decay: Vec<f64> = time.iter().map(|at| (-(at - time[0]) / tau).exp()).collect();
     // Least squares on the decay, and on a constant where the two can be distinguished.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (mean_decay, mean_reading) = zero.map_or_else(|| (mean(&decay), mean(at_rest)), |zero| (0.0, zero));
-    let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
-    let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
-    let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
-    let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
-    height.abs() * power.sqrt() > SIGNIFICANT_DECAY.get() * from_row_to_row.max(scaled_deviation_of_sum(&left))
+    let falls = |tau: f64| {
+        let decay: Vec<f64> = time.iter().map(|at| (-(at - time[0]) / tau).exp()).collect();
+        let (mean_decay, mean_reading) = zero.map_or_else(|| (mean(&decay), mean(at_rest)), |zero| (0.0, zero));
+        let pairs = || decay.iter().zip(at_rest).map(|(decay, reading)| (decay - mean_decay, reading - mean_reading));
+        let power: f64 = pairs().map(|(decay, _)| decay * decay).sum();
+        let height = pairs().map(|(decay, reading)| decay * reading).sum::<f64>() / power;
+        let left: Vec<f64> = pairs().map(|(decay, reading)| reading - height * decay).collect();
+        height.abs() * power.sqrt() > SIGNIFICANT_DECAY.get() * from_row_to_row.max(scaled_deviation_of_sum(&left))
+    };
+    time_constants.any(falls)
 }
 
 /// Returns the standard deviation of the sum of autocorrelated noise over `n` rows, divided by `sqrt(n)`: `sigma
