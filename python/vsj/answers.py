@@ -89,6 +89,15 @@ class Start:
 
 
 @dataclass(frozen=True)
+class FarReading:
+    """A reading far from those around it and from every model: ``time_s`` in s, ``reading`` in its unit."""
+
+    record: str
+    time_s: float
+    reading: float
+
+
+@dataclass(frozen=True)
 class ErrorStatistics:
     """The errors that the linear spring leaves."""
 
@@ -318,7 +327,7 @@ class Identified(Answer):
 
     ``plant`` is the text of a plant file. ``courses`` holds the name of each record and its arrays of shape ``(n,)``: ``time_s``
     in s, ``voltage_v`` in V, ``reading``, ``model``, ``residual`` and ``held_out`` (reading minus a prediction by a fit that did
-    not use the segment) in the reading's unit.
+    not use the segment) in the reading's unit, without the readings of ``left_out``.
     """
 
     schema: int
@@ -334,6 +343,7 @@ class Identified(Answer):
     linear: List[LinearError]
     start: List[Start]
     noise: ErrorStatistics
+    left_out: List[FarReading]
     remarks: List[str]
     unit: str
     model: Optional[str]

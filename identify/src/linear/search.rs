@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use crate::linear::problem::{Fit, Poles, Problem};
 use crate::linear::section::Section;
 use crate::linear::series::Series;
+use crate::stats::median::median;
 use crate::stats::periodogram::powers;
 
 /// Largest order of a model.
@@ -197,17 +198,21 @@ fn geometric(from: f64, to: f64, ratio: f64) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(from), move |last| Some(last * ratio)).take_while(move |value| *value <= to)
 }
 
-/// Angular frequencies of the highest peaks of the residual's spectrum and their widths, of the longest uniform record.
+/// Angular frequencies of the highest peaks of the residual's spectrum and their widths, of the longest record with equal rows; where
+/// a reading is missing, the residual is 0.
 fn peaks(problem: &Problem, residual: &[f64]) -> Vec<(f64, f64)> {
     let records = problem.series.iter().zip(problem.starts());
     let Some((series, &first)) =
-        records.filter(|(series, _)| series.uniform).max_by_key(|(series, _): &(&Series, _)| series.rows())
+        records.filter(|(series, _)| series.even).max_by_key(|(series, _): &(&Series, _)| series.rows())
     else {
         return Vec::new();
     };
-    let rows = series.rows();
-    let power = powers(&residual[first..first + rows]);
-    let step = series.duration() / (rows.max(2) - 1) as f64;
+    let mut gaps: Vec<f64> = series.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let Some(step) = median(&mut gaps) else { return Vec::new() };
+    let place = |time: f64| ((time - series.time[0]) / step).round() as usize;
+    let mut placed = vec![0.0; place(series.time[series.rows() - 1]) + 1];
+    series.time.iter().zip(&residual[first..]).for_each(|(&time, error)| placed[place(time)] = *error);
+    let power = powers(&placed);
     let of_bin = PI / ((power.len() - 1) as f64 * step);
     let mut peaks: Vec<usize> =
         (2..power.len() - 1).filter(|&at| power[at] > power[at - 1] && power[at] >= power[at + 1]).collect();

@@ -42,8 +42,6 @@ pub struct Series {
     pub held: bool,
     /// True if the rows are equally spaced.
     pub even: bool,
-    /// True if the readings are equally spaced.
-    pub uniform: bool,
     pub(super) at_rest: bool,
     pieces: Vec<Piece>,
 }
@@ -80,7 +78,6 @@ impl Series {
             spacing: if evenly { step } else { spacing },
             held: input == Input::Hold,
             even: evenly,
-            uniform: evenly && commanded.len() == voltage.len(),
             pieces,
         }
     }
@@ -102,7 +99,6 @@ impl Series {
     /// The series with the readings of some rows and the voltage of all; its first reading stays the start.
     pub(super) fn only(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
         let mut part = self.clone();
-        part.uniform = false;
         let kept: Vec<bool> = (0..self.rows()).map(&mut keeps).collect();
         let mut of = kept.iter();
         part.time.retain(|_| *of.next().expect("a row"));

@@ -8,6 +8,7 @@
 
 mod canonical;
 pub mod covariance;
+mod far_readings;
 mod plant;
 pub mod remarks;
 pub mod report;
@@ -24,7 +25,9 @@ use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, best_up_to,
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::plant::VoltageRange;
-use crate::nominal::report::{InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
+use crate::nominal::report::{
+    FarReading, InputLaw, Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant,
+};
 use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
@@ -57,6 +60,8 @@ const LONG: usize = 20_000;
 const REFIT: (usize, f64) = (10, 1e-5);
 /// Readings times steps that such a refinement may cost.
 const MOST_REFITTED: usize = 300_000;
+/// Most searches for the best model without the readings that were far from the one before.
+const MOST_SEARCHES: usize = 3;
 
 /// An identified spring.
 #[derive(Clone, Debug)]
@@ -67,13 +72,13 @@ pub struct Identified {
     pub plant: PlantFile,
     /// True if the spring was taken to be at rest when each record begins.
     pub settled: bool,
-    /// The best linear model of the records, which may be of another order or law of the input.
+    /// The best linear model of the records, which may be of another order or law of the input; `None` if readings were left out.
     pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
     pub records: Vec<Course>,
 }
 
-/// One record compared with the model; all vectors have one element per reading.
+/// One record compared with the model; all vectors have one element per reading that was not left out.
 #[derive(Clone, Debug)]
 pub struct Course {
     /// Name of the record.
@@ -198,7 +203,8 @@ fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
     -effective.min(rows) * ratio.ln() > RIVAL_ODDS + price * more
 }
 
-/// Identifies the spring of one or several records; each has its own zero and start.
+/// Identifies the spring of one or several records; each has its own zero and start. Readings that are far from all around them are
+/// left out.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
@@ -209,6 +215,51 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     for record in records {
         check(record)?;
     }
+    let mut kept = records.to_vec();
+    let mut left_out = Vec::new();
+    let far = kept.iter().map(far_readings::at_start).collect();
+    leave_out(&mut kept, far, &mut left_out);
+    let mut identified = of_all(&kept, input, units);
+    for _ in 1..MOST_SEARCHES {
+        let delay = identified.report.nominal.delay_s.value;
+        let far = identified.records.iter().map(|course| far_readings::of_errors(course, delay)).collect();
+        if !leave_out(&mut kept, far, &mut left_out) {
+            break;
+        }
+        identified = of_all(&kept, input, units);
+    }
+    if !left_out.is_empty() {
+        left_out.sort_by(|a, b| a.record.cmp(&b.record).then(a.time_s.total_cmp(&b.time_s)));
+        identified.linear = None;
+        identified.report.remarks.insert(0, remarks::left_out(&left_out, units));
+        identified.report.left_out = left_out;
+    }
+    Ok(identified)
+}
+
+/// Takes readings out of each record, by their number among its readings, and adds them to a list. Returns false if there are none, or
+/// if a record would be left that cannot be identified.
+fn leave_out(records: &mut Vec<Record>, far: Vec<Vec<usize>>, left_out: &mut Vec<FarReading>) -> bool {
+    let mut kept = records.clone();
+    let mut taken = Vec::new();
+    for (record, far) in kept.iter_mut().zip(far) {
+        let mut rows: Vec<_> = record.rows.iter_mut().filter(|row| row.measured.is_some()).collect();
+        for reading in far {
+            let row = &mut rows[reading];
+            let value = row.measured.take().expect("a row with a reading");
+            taken.push(FarReading { record: record.name.clone(), time_s: row.time_s, reading: value });
+        }
+    }
+    if taken.is_empty() || kept.iter().any(|record| check(record).is_err()) {
+        return false;
+    }
+    *records = kept;
+    left_out.append(&mut taken);
+    true
+}
+
+/// Identifies the spring of records that were checked, from all of their readings.
+fn of_all(records: &[Record], input: Input, units: &Units) -> Identified {
     let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
     let mut models = Models::of(series.clone(), InputLaw::Linear);
     let linear = models.best();
@@ -231,7 +282,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         }
     }
     let voltage = VoltageRange { full_scale_v: full_scale, both_signs };
-    Ok(Identified { linear, ..identified(records, models, voltage, units) })
+    Identified { linear, ..identified(records, models, voltage, units) }
 }
 
 /// The best linear model of some records.
@@ -343,6 +394,7 @@ fn identified(records: &[Record], models: Models, voltage: VoltageRange, units: 
         start,
         noise,
         remarks: Vec::new(),
+        left_out: Vec::new(),
         unit: reading.into(),
         model: None,
     };

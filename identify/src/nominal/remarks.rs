@@ -5,10 +5,28 @@ use simulation::units::Units;
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
 use crate::nominal::STRUCTURED;
-use crate::nominal::report::{InputLaw, Report};
+use crate::nominal::report::{FarReading, InputLaw, Report};
 
 /// A time constant with a larger ratio of its bounds is hardly known.
 const HARDLY_KNOWN: f64 = 4.0;
+
+/// Readings whose times a remark lists.
+const LISTED: usize = 5;
+
+/// The remark on readings that were left out.
+pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
+    // Ten digits, without the trailing zeros.
+    let shown = |time: f64| format!("{time:.9e}").parse().unwrap_or(time).to_string();
+    let times: Vec<String> = readings.iter().take(LISTED).map(|far| shown(far.time_s / units.time.si)).collect();
+    let (verb, noun) = if readings.len() == 1 { ("is", "reading") } else { ("are", "readings") };
+    format!(
+        "{} {noun} far from all around {verb} left out of the model and of its errors (at {}{} {}); `vsj diagnose` judges all readings.",
+        readings.len(),
+        times.join(", "),
+        if readings.len() > LISTED { ", ..." } else { "" },
+        units.time.name
+    )
+}
 
 /// The remarks on an identification.
 pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {

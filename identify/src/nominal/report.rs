@@ -77,6 +77,17 @@ pub struct Noise {
     pub scatter: f64,
 }
 
+/// A reading that is far from those around it and from every model, so that it was left out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FarReading {
+    /// Name of the record.
+    pub record: String,
+    /// Time in the record, in s.
+    pub time_s: f64,
+    /// The reading, in its unit.
+    pub reading: f64,
+}
+
 /// What of the voltage the spring responds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -94,7 +105,7 @@ pub enum InputLaw {
 pub struct Report {
     /// Version of the JSON format.
     pub schema: u32,
-    /// Number of readings of all records.
+    /// Number of readings of all records, without those that were left out.
     pub rows: usize,
     /// Number of poles of the nominal model.
     pub order: usize,
@@ -118,6 +129,8 @@ pub struct Report {
     pub start: Vec<Start>,
     /// The errors that the model leaves.
     pub noise: Noise,
+    /// The readings that were left out.
+    pub left_out: Vec<FarReading>,
     /// What the records cannot tell, one sentence each.
     pub remarks: Vec<String>,
     /// Name of the reading's unit.

@@ -54,6 +54,46 @@ fn intervals_contain_the_truth_in_about_95_percent_of_the_records() {
     }
 }
 
+/// Least squares would let a delay, a quick time constant or an oscillation follow such readings, and widen the intervals.
+#[test]
+fn readings_that_no_spring_made_are_left_out() {
+    let clean = record(400, 1000, 0.0, 0.5);
+    let width = |report: &Report| report.nominal.tau_s[0].tau.high / report.nominal.tau_s[0].tau.low;
+    let expected = found(&[clean.clone()]).report;
+    for wrong in [vec![0], vec![1], vec![0, 1], vec![67, 150, 233, 234, 399]] {
+        let mut record = clean.clone();
+        wrong.iter().for_each(|&row| *record.rows[row].measured.as_mut().expect("a reading") += 90.0);
+        let report = found(&[record]).report;
+        let rows: Vec<usize> = report.left_out.iter().map(|far| (4.0 * far.time_s) as usize).collect();
+        assert_eq!(rows, wrong);
+        assert_eq!((report.order, report.rows), (expected.order, 400 - wrong.len()), "{wrong:?}");
+        assert!(width(&report) < 1.1 * width(&expected), "{wrong:?}: {}", width(&report));
+        assert!(report.remarks[0].contains("left out"), "{:?}", report.remarks);
+    }
+    assert!(expected.left_out.is_empty());
+}
+
+/// A quick lag leaves large errors of a static model only after steps, and a decay from an earlier voltage large ones at the start.
+#[test]
+fn readings_that_follow_the_voltage_or_a_start_are_kept() {
+    let noise = normals(600);
+    for (tau, decay) in [(0.6, 0.0), (3.0, 0.0), (40.0, 60.0), (2.0, 60.0), (1.0, 60.0)] {
+        let (mut lag, mut free) = (0.0, decay);
+        let row = |row: usize| {
+            let voltage_v = 100.0 * (row / 25 % 3) as f64;
+            let reading = 2.0 + lag + free + 0.1 * noise[row];
+            let remains = f64::exp(-1.0 / tau);
+            lag = voltage_v + (lag - voltage_v) * remains;
+            free *= remains;
+            Row { line: 0, time_s: row as f64, voltage_v, measured: Some(reading) }
+        };
+        let record = Record { name: "steps".into(), rows: (0..600).map(row).collect() };
+        let report = found(&[record]).report;
+        assert!(report.left_out.is_empty(), "{tau}: {:?}", report.left_out);
+        assert!((report.nominal.tau_s[0].tau.value / tau - 1.0).abs() < 0.1, "{tau}: {:?}", report.nominal.tau_s);
+    }
+}
+
 /// Two lags in series behind a law that saturates: no order is right, and each held-out error counts.
 #[test]
 fn order_of_a_spring_that_is_not_linear_has_the_least_held_out_error() {
