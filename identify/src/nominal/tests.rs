@@ -59,7 +59,7 @@ fn intervals_contain_the_truth_in_about_95_percent_of_the_records() {
 fn readings_that_no_spring_made_are_left_out() {
     let clean = record(400, 1000, 0.0, 0.5);
     let width = |report: &Report| report.nominal.tau_s[0].tau.high / report.nominal.tau_s[0].tau.low;
-    let expected = found(&[clean.clone()]).report;
+    let expected = found(std::slice::from_ref(&clean)).report;
     for wrong in [vec![0], vec![1], vec![0, 1], vec![67, 150, 233, 234, 399]] {
         let mut record = clean.clone();
         wrong.iter().for_each(|&row| *record.rows[row].measured.as_mut().expect("a reading") += 90.0);

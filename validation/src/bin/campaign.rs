@@ -297,13 +297,16 @@ fn main() -> ExitCode {
 /// True if every criterion is met.
 fn run(cli: &Cli) -> Result<bool> {
     if let Some(Command::Real { folder, no_python, json }) = &cli.command {
-        let rows = measured("real", &real::open(folder)?, !no_python)?;
+        let (subjects, mut refused) = real::open(folder)?;
+        let (rows, later) = measured("real", &subjects, !no_python)?;
+        refused.extend(later);
         if *json {
-            println!("{}", json!({ "real": rows }));
+            println!("{}", json!({ "real": rows, "refused": refused }));
         } else {
             print!("{}", real::table(&rows));
         }
-        return Ok(true);
+        refused.iter().for_each(|record| eprintln!("{}: refused: {}", record.name, record.reason));
+        return Ok(refused.is_empty());
     }
     if let Some(Command::Isolation(options)) = &cli.command {
         let text = isolation::page(options.first_seed, options.records)?;
@@ -414,7 +417,10 @@ impl Cli {
                 Ok(Done::new(part, markdown, json!(rows)))
             }
             Part::Instruments => {
-                let rows = measured("instruments", &real::twins(first), true)?;
+                let (rows, refused) = measured("instruments", &real::twins(first), true)?;
+                if let Some(record) = refused.first() {
+                    bail!("{}: {}", record.name, record.reason);
+                }
                 let markdown = real::table(&rows);
                 Ok(Done::new(part, markdown, json!(rows)))
             }
@@ -559,11 +565,11 @@ impl Done {
 }
 
 /// Results of records with their own units; with `python`, also of the other tools.
-fn measured(what: &str, subjects: &[real::Subject], python: bool) -> Result<Vec<real::Row>> {
+fn measured(what: &str, subjects: &[real::Subject], python: bool) -> Result<(Vec<real::Row>, Vec<real::Refused>)> {
     let bar = bar(what, subjects.len())?;
-    let rows = real::run(subjects, python, &bar)?;
+    let measured = real::run(subjects, python, &bar)?;
     bar.finish_and_clear();
-    Ok(rows)
+    Ok(measured)
 }
 
 fn bar(what: &str, length: usize) -> Result<ProgressBar> {

@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use cpu_time::ProcessTime;
+use identify::dimension::significant;
 use identify::nominal::identify;
 use identify::stats::scale::{centred, root_mean_square};
 use identify::{Input, Options, examine};
@@ -84,11 +85,26 @@ pub struct Row {
     pub seconds: [f64; 2],
 }
 
-/// Reads every CSV file of a folder.
+/// A record without results.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refused {
+    /// Name of the record.
+    pub name: String,
+    /// What was wrong with it.
+    pub reason: String,
+}
+
+impl Refused {
+    fn new(name: String, reason: &anyhow::Error) -> Self {
+        Self { name, reason: format!("{reason:#}") }
+    }
+}
+
+/// Reads every CSV file of a folder; also returns the records that cannot be read.
 ///
 /// # Errors
-/// A folder without a CSV file, or a record or description that cannot be read.
-pub fn open(folder: &Path) -> Result<Vec<Subject>> {
+/// A folder without a CSV file, or that cannot be read.
+pub fn open(folder: &Path) -> Result<(Vec<Subject>, Vec<Refused>)> {
     let entries = fs::read_dir(folder).with_context(|| format!("{}: cannot be read", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
@@ -96,7 +112,19 @@ pub fn open(folder: &Path) -> Result<Vec<Subject>> {
     if paths.is_empty() {
         bail!("{}: no file NAME.csv; expected records, each with an optional NAME.toml", folder.display());
     }
-    paths.iter().map(|path| subject(path)).collect()
+    let (mut subjects, mut refused) = (Vec::new(), Vec::new());
+    for path in paths {
+        match subject(&path) {
+            Ok(subject) => subjects.push(subject),
+            Err(reason) => refused.push(Refused::new(stem(&path), &reason)),
+        }
+    }
+    Ok((subjects, refused))
+}
+
+/// Name of a file without folder and extension.
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 fn subject(path: &Path) -> Result<Subject> {
@@ -115,8 +143,7 @@ fn subject(path: &Path) -> Result<Subject> {
         Some(other) => bail!("{}: input = {other:?}; expected hold or linear", description.display()),
     };
     let measured = format.open(path)?;
-    let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(Subject { name, known, record: measured.record, units: measured.units, input })
+    Ok(Subject { name: stem(path), known, record: measured.record, units: measured.units, input })
 }
 
 /// The format of a file without a description: time, voltage and reading are its first three columns.
@@ -145,19 +172,22 @@ pub fn twins(seed: u64) -> Vec<Subject> {
     other_plants::all(seed).into_iter().map(subject).collect()
 }
 
-/// Identifies and diagnoses every record; with `python`, also by PySINDy and SysIdentPy.
+/// Identifies and diagnoses every record; with `python`, also by PySINDy and SysIdentPy. Also returns the records that were refused.
 ///
 /// # Errors
-/// A record is rejected, or a tool fails.
-pub fn run(subjects: &[Subject], python: bool, progress: &ProgressBar) -> Result<Vec<Row>> {
+/// Python is missing, or one of its packages fails.
+pub fn run(subjects: &[Subject], python: bool, progress: &ProgressBar) -> Result<(Vec<Row>, Vec<Refused>)> {
     let others = if python { others(subjects)? } else { vec![Vec::new(); subjects.len()] };
-    let mut rows = Vec::new();
+    let (mut rows, mut refused) = (Vec::new(), Vec::new());
     for (subject, others) in subjects.iter().zip(others) {
         progress.set_message(subject.name.clone());
-        rows.push(row(subject, others).with_context(|| subject.name.clone())?);
+        match row(subject, others) {
+            Ok(row) => rows.push(row),
+            Err(reason) => refused.push(Refused::new(subject.name.clone(), &reason)),
+        }
         progress.inc(1);
     }
-    Ok(rows)
+    Ok((rows, refused))
 }
 
 fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answer>) -> Result<Row> {
@@ -203,10 +233,12 @@ fn row(Subject { name, known, record, units, input }: &Subject, others: Vec<Answ
 /// Gain, share, delay, time constants and oscillations of a nominal spring.
 fn in_words(report: &identify::nominal::report::Report) -> String {
     let nominal = &report.nominal;
-    let mut words = vec![format!("gain {:.3e}, share {:.2}", nominal.gain.value, nominal.share.value)];
-    words.extend((nominal.delay_s.value > 0.0).then(|| format!("delay {:.3} s", nominal.delay_s.value)));
-    words.extend(nominal.tau_s.iter().map(|of| format!("tau {:.3} s ({:.2})", of.tau.value, of.weight.value)));
-    words.extend(report.oscillation.iter().map(|of| format!("{:.3} Hz (zeta {:.3})", of.freq_hz.value, of.zeta.value)));
+    let number = |value: f64| significant(value, 4);
+    let mut words = vec![format!("gain {}, share {:.2}", number(nominal.gain.value), nominal.share.value)];
+    words.extend((nominal.delay_s.value > 0.0).then(|| format!("delay {} s", number(nominal.delay_s.value))));
+    words.extend(nominal.tau_s.iter().map(|of| format!("tau {} s ({:.2})", number(of.tau.value), of.weight.value)));
+    let oscillations = report.oscillation.iter();
+    words.extend(oscillations.map(|of| format!("{} Hz (zeta {:.3})", number(of.freq_hz.value), of.zeta.value)));
     words.join(", ")
 }
 
@@ -270,4 +302,28 @@ asked for, or diverged.
     text += &markdown::table(&header, rows.iter().map(line));
     let known = rows.iter().map(|row| vec![row.name.clone(), row.known.clone(), row.nominal.clone()]);
     text + "\n" + &markdown::table(&["record", "known to be in it", "nominal spring"], known)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A record that cannot be read, or identified, is named; the others are judged all the same.
+    #[test]
+    fn bad_records_do_not_stop_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let steps = (0..200)
+            .map(|row| format!("{},{},{}\n", row, row / 20 % 3, (row / 20 % 3) as f64 + 0.01 * (row % 7) as f64));
+        let good = format!("t,u,y\n{}", steps.collect::<String>());
+        let constant = format!("t,u,y\n{}", (0..200).map(|row| format!("{row},1,{row}\n")).collect::<String>());
+        for (name, text) in [("a_bad", "t,u,y\n0,0,x\n"), ("b_constant", &constant), ("c_good", &good)] {
+            fs::write(folder.path().join(name).with_extension("csv"), text).unwrap();
+        }
+        let (subjects, unread) = open(folder.path()).unwrap();
+        let (rows, refused) = run(&subjects, false, &ProgressBar::hidden()).unwrap();
+        let names = |refused: &[Refused]| refused.iter().map(|of| of.name.clone()).collect::<Vec<_>>();
+        assert_eq!((names(&unread), names(&refused)), (vec!["a_bad".into()], vec!["b_constant".into()]));
+        assert!(refused[0].reason.contains("voltage never changes"), "{}", refused[0].reason);
+        assert_eq!(rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>(), ["c_good"]);
+    }
 }

@@ -184,8 +184,10 @@ fn bench() -> PathBuf {
 fn python() -> Result<PathBuf> {
     // The program is TARGET/PROFILE/campaign.
     let program = std::env::current_exe()?;
-    let venv =
-        program.ancestors().nth(2).context("the program is below the target folder")?.join("identification-venv");
+    let target = program.ancestors().nth(2).filter(|folder| folder.join("CACHEDIR.TAG").exists());
+    let venv = target
+        .with_context(|| format!("{}: expected in a target folder, as cargo builds it", program.display()))?
+        .join("identification-venv");
     let python = venv.join("bin/python");
     let wanted = fs::read(bench().join("requirements.txt"))?;
     let installed = venv.join("requirements.txt");
