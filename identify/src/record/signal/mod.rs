@@ -8,6 +8,7 @@ mod command;
 mod lag;
 mod oscillator;
 mod piecewise;
+mod recent;
 
 pub use lag::{Lag, pass_lags};
 pub use oscillator::Oscillator;
