@@ -7,6 +7,7 @@ use simulation::record::Record;
 
 use crate::nominal::Course;
 use crate::stats::median::{median, robust_deviation};
+use crate::stats::thresholds::empirical::{CHANGE_OF_FULL_SCALE, ROWS_AFTER_CHANGE};
 use crate::stats::thresholds::probability::Z_RARE;
 
 /// A reading is far off if it deviates from those around it by more scales of all such deviations, ...
@@ -21,8 +22,6 @@ const AROUND: usize = 3;
 const LINE: usize = 8;
 /// If more of the readings are far off, they are a part of the response.
 const MOST: f64 = 0.05;
-/// Readings up to here after a change of the voltage, and the delay, may follow it.
-const AFTER_CHANGE: usize = 4;
 /// Records with fewer readings have no scale of their own.
 const FEWEST: usize = 20;
 
@@ -65,9 +64,12 @@ pub(super) fn of_errors(course: &Course, delay: f64) -> Vec<usize> {
     if far.is_empty() || far.len() as f64 > MOST * rows as f64 {
         return Vec::new();
     }
+    let (time, voltage) = (&course.time_s, &course.voltage_v);
+    let full_scale = voltage.iter().fold(0.0, |most: f64, volts| most.max(volts.abs()));
+    let changes = |row: usize| (voltage[row] - voltage[row - 1]).abs() > CHANGE_OF_FULL_SCALE.get() * full_scale;
     let mut after = vec![false; rows];
-    for row in (1..rows).filter(|&row| course.voltage_v[row] != course.voltage_v[row - 1]) {
-        let last = course.time_s.partition_point(|time| *time <= course.time_s[row] + delay) + AFTER_CHANGE;
+    for row in (1..rows).filter(|&row| changes(row)) {
+        let last = time.partition_point(|at| *at <= time[row] + delay) + ROWS_AFTER_CHANGE.count();
         after[row..last.min(rows)].fill(true);
     }
     let part = after.iter().filter(|after| **after).count() as f64 / rows as f64;
