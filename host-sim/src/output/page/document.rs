@@ -25,6 +25,15 @@ pub(in crate::output) fn document(title: &str, body: Markup) -> String {
     page.into_string()
 }
 
+/// A sentence of the terminal as markup: what stands between backticks is code.
+pub(in crate::output) fn prose(sentence: &str) -> Markup {
+    html! {
+        @for (index, part) in sentence.split('`').enumerate() {
+            @if index % 2 == 0 { (part) } @else { code { (part) } }
+        }
+    }
+}
+
 /// The markup with each number and its unit on one line, except in what is quoted to be copied.
 fn with_units_kept(markup: &str) -> String {
     let mut is_quoted = false;
@@ -53,6 +62,12 @@ fn unbroken(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn backticks_become_code() {
+        let html = prose("a < b; `vsj plan` computes it").into_string();
+        assert_eq!(html, "a &lt; b; <code>vsj plan</code> computes it");
+    }
 
     #[test]
     fn no_line_breaks_between_a_number_and_its_unit() {
