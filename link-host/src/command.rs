@@ -17,16 +17,22 @@ impl Client {
         match self.order(request) {
             Ok(done) => Ok(done),
             Err(Failure::Refused(reason @ Reason::OutOfRange { .. })) => {
-                let unit = match request {
-                    Request::Set(Desired::Pascal(_)) => "Pa",
-                    Request::Set(Desired::NewtonPerMetre(_)) => "N/m",
-                    _ => "V",
-                };
-                bad_input!("{}: {reason} {unit}", self.name())
+                bad_input!("{}: {}", self.name(), refusal(&request, &reason))
             }
             Err(failure) => Err(failure).with_context(|| self.name().to_owned()),
         }
     }
+}
+
+/// Why the MCU has rejected the request, as text. The bounds of a range come without their unit, which is that of the request.
+pub fn refusal(request: &Request, reason: &Reason) -> String {
+    let unit = match (reason, request) {
+        (Reason::OutOfRange { .. }, Request::Set(Desired::Pascal(_))) => " Pa",
+        (Reason::OutOfRange { .. }, Request::Set(Desired::NewtonPerMetre(_))) => " N/m",
+        (Reason::OutOfRange { .. }, _) => " V",
+        _ => "",
+    };
+    format!("{reason}{unit}")
 }
 
 /// The desired stiffness: a finite number, in V of equivalent static voltage unless Pa or N/m follows, in any case.
@@ -59,6 +65,21 @@ pub fn fault(text: &str) -> Result<Fault> {
         _ => {
             let names: Vec<_> = known.map(Fault::name).collect();
             bad_input!("{text} is not a fault; expected {} or a number of 1 to 255", names.join(", "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bounds_of_a_refused_stiffness_have_the_unit_of_the_request() {
+        let reason = Reason::OutOfRange { lowest: 0.0, highest: 700.0 };
+        for (text, unit) in [("701", "V"), ("3e9Pa", "Pa"), ("9 N/m", "N/m")] {
+            let request = Request::Set(desired(text).unwrap());
+            assert_eq!(refusal(&request, &reason), format!("out of range: expected 0 to 700 {unit}"));
+            assert_eq!(refusal(&request, &Reason::NotArmed), "not armed");
         }
     }
 }

@@ -5,6 +5,7 @@
 //! | [`Port`] | a serial device, a unix socket or a TCP socket, as bytes |
 //! | [`Client`] | sends requests and repeats them until they are answered; collects telemetry |
 //! | [`fault`], [`desired`] | the fault with a name or a number; the stiffness that a text with its unit names |
+//! | [`refusal`] | why the MCU has rejected a request, with the unit of its bounds |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
 //! | [`StatusReport`], [`IsolationRow`], [`AdaptationRow`], [`Row`] | status, isolation bank, adaptation and telemetry of the MCU, as text and JSON |
 
@@ -16,7 +17,7 @@ mod report;
 mod requests;
 
 pub use client::{Client, Patience, heartbeat};
-pub use command::{desired, fault};
+pub use command::{desired, fault, refusal};
 pub use failure::Failure;
 pub use port::Port;
 pub use report::{AdaptationRow, IsolationRow, Row, StatusReport};

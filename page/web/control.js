@@ -1,6 +1,6 @@
 // The control panel: a target through the controller, with stiffness, voltage and the bound.
 
-import { byId, decimals, digits, html, save, table } from "./dom.js";
+import { byId, decimals, digits, html, save, say, table } from "./dom.js";
 import { Engine } from "./engine.js";
 import { COLOUR, show } from "./plot.js";
 import { spring } from "./spring.js";
@@ -132,7 +132,7 @@ export class ControlPanel {
 
   #refuse(error) {
     byId("control-error").textContent = error.message;
-    byId("control-status").textContent = "";
+    say("control-status", "");
   }
 
   #show(run, request) {
@@ -162,8 +162,8 @@ export class ControlPanel {
       ],
     });
     byId("steps").replaceChildren(...(answer.steps.length ? [steps(answer)] : []));
-    byId("control-status").textContent = summary(answer, run.remarks);
-    byId("truth").textContent = hidden ? truth(hidden) : "";
+    say("control-status", summary(answer, run.remarks));
+    say("truth", hidden ? truth(hidden) : "");
     byId("hidden-record").hidden = !hidden;
     byId("command").textContent = command(request);
   }

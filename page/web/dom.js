@@ -13,12 +13,21 @@ export function svg(name, attributes = {}, ...children) {
   return filled(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
 }
 
+/** A number, or its interval, before the unit after it. */
+const VALUE = /(?<=[\d\]]) (?=(?:%|[num\u00b5kM]?[VsmNA]|k?Hz|[kMG]?Pa|degC|nats|min|h)(?!\w))/g;
+
+/** The text with a no-break space between each number and its unit. */
+const unbroken = (text) => text.replace(VALUE, "\u00a0");
+
+/** Shows a sentence in the element with an id. */
+export const say = (id, sentence) => byId(id).replaceChildren(unbroken(sentence));
+
 function filled(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value !== false && value != null) element.setAttribute(name, value === true ? "" : value);
   }
-  element.append(...children.filter((child) => child != null));
+  element.append(...children.filter((child) => child != null).map((child) => (typeof child === "string" ? unbroken(child) : child)));
   return element;
 }
 

@@ -1,6 +1,6 @@
 // The plan of the next experiment: from the JSON of a diagnosis, within what the user allows.
 
-import { byId, digits, save, table } from "./dom.js";
+import { byId, digits, save, say, table } from "./dom.js";
 import { Cancelled } from "./engine.js";
 import { COLOUR, show } from "./plot.js";
 
@@ -26,7 +26,8 @@ export class PlanPanel {
     this.#diagnosis = diagnosis;
     byId("next").hidden = !diagnosis;
     byId("planned").hidden = true;
-    byId("plan-error").textContent = byId("plan-status").textContent = "";
+    byId("plan-error").textContent = "";
+    say("plan-status", "");
   }
 
   async #run() {
@@ -34,14 +35,14 @@ export class PlanPanel {
     const request = { minutes: number("minutes"), limit_v: number("plan-limit"), slew_v_per_s: number("plan-slew") };
     byId("plan").disabled = true;
     byId("plan-error").textContent = "";
-    byId("plan-status").textContent = "Planning.";
+    say("plan-status", "Planning.");
     try {
       const files = new TextEncoder().encode(this.#diagnosis).buffer;
       this.#plan = await this.#engine.ask({ command: "plan", ...request }, { files });
       this.#show();
     } catch (error) {
       byId("planned").hidden = true;
-      byId("plan-status").textContent = "";
+      say("plan-status", "");
       if (!(error instanceof Cancelled)) byId("plan-error").textContent = error.message;
     }
     byId("plan").disabled = false;
@@ -59,7 +60,7 @@ export class PlanPanel {
     const series = responses.map(([set, curve], index) => ({ name: causes(set), colour: COLOURS[index % COLOURS.length], curve }));
     show(byId("response-plot"), { title: "Predicted readings", x, y: `reading [${unit}]`, series });
     byId("plan-answer").replaceChildren(...answer(plan));
-    byId("plan-status").textContent = [sentence(plan), ...plan.remarks.map((remark) => `${remark}.`)].join(" ");
+    say("plan-status", [sentence(plan), ...plan.remarks.map((remark) => `${remark}.`)].join(" "));
   }
 }
 

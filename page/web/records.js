@@ -1,6 +1,6 @@
 // The record panel: CSV files identified or diagnosed in a worker, with progress, and what was found.
 
-import { byId, digits, html, save, table } from "./dom.js";
+import { byId, digits, html, save, say, table } from "./dom.js";
 import { Cancelled, Engine } from "./engine.js";
 import { PlanPanel } from "./plan.js";
 import { COLOUR, show } from "./plot.js";
@@ -83,7 +83,7 @@ export class RecordPanel {
   #cancel() {
     if (this.#stopping || this.#command !== "diagnose" || !this.#engine.stop()) return this.#engine.cancel();
     this.#stopping = true;
-    byId("record-status").textContent = "Ending the search with its best answer so far. Cancel ends it without an answer.";
+    say("record-status", "Ending the search with its best answer so far. Cancel ends it without an answer.");
   }
 
   #request(command) {
@@ -110,7 +110,7 @@ export class RecordPanel {
     clearInterval(this.#clock);
     if (!busy) return;
     const began = performance.now();
-    const tell = () => (byId("elapsed").textContent = `${((performance.now() - began) / 1000).toFixed(0)} s`);
+    const tell = () => say("elapsed", `${((performance.now() - began) / 1000).toFixed(0)} s`);
     tell();
     this.#clock = setInterval(tell, 1000);
   }
@@ -120,16 +120,16 @@ export class RecordPanel {
     [this.#command, this.#stopping] = [command, false];
     byId("record-error").textContent = "";
     byId("found").hidden = true;
-    byId("record-status").textContent = `${command === "diagnose" ? "Diagnosing" : "Identifying"} ${names}.`;
-    byId("so-far").textContent = "";
+    say("record-status", `${command === "diagnose" ? "Diagnosing" : "Identifying"} ${names}.`);
+    say("so-far", "");
     this.#busy(true);
-    const onProgress = ({ causes }) => (byId("so-far").textContent = `So far: ${causes || "no cause"}.`);
+    const onProgress = ({ causes }) => say("so-far", `So far: ${causes || "no cause"}.`);
     try {
       const files = await new Blob(this.#files.map(({ bytes }) => bytes)).arrayBuffer();
       const found = await this.#engine.ask(this.#request(command), { files, onProgress });
       this.#show(command, found);
     } catch (error) {
-      if (error instanceof Cancelled) byId("record-status").textContent = `Cancelled. ${byId("so-far").textContent}`.trim();
+      if (error instanceof Cancelled) say("record-status", `Cancelled. ${byId("so-far").textContent}`.trim());
       else this.#refuse(error.message);
     }
     this.#busy(false);
@@ -137,7 +137,7 @@ export class RecordPanel {
 
   #refuse(message) {
     byId("record-error").textContent = message;
-    byId("record-status").textContent = "";
+    say("record-status", "");
   }
 
   #show(command, { json, remarks, plant, units, records }) {
@@ -157,7 +157,7 @@ export class RecordPanel {
     this.#draw();
     this.#plan.offer(command === "diagnose" ? json : undefined);
     const identified = `Identified from ${report.rows} rows: held-out error ${digits(report.held_out_rmse)} ${report.unit}.`;
-    byId("record-status").textContent = command === "diagnose" ? sentence(report) : identified;
+    say("record-status", command === "diagnose" ? sentence(report) : identified);
   }
   /** Draws the record that is chosen. */
   #draw() {

@@ -73,11 +73,15 @@ pub(crate) fn usual_reading(name: &str) -> bool {
     READINGS.contains(&name)
 }
 
+/// True for the name of a usual unit of time, voltage or readings.
+pub fn is_usual(name: &str) -> bool {
+    Unit::of_time(name).is_ok() || usual_volts(name).is_some() || usual_reading(name)
+}
+
 /// True for a cell that holds a unit and nothing else: a usual one, or any in brackets.
 pub(crate) fn is_unit(cell: &str) -> bool {
     let is_in = |open, close| cell.len() > 2 && cell.starts_with(open) && cell.ends_with(close);
-    let is_usual = Unit::of_time(cell).is_ok() || usual_volts(cell).is_some() || usual_reading(cell);
-    is_usual || is_in('[', ']') || is_in('(', ')')
+    is_usual(cell) || is_in('[', ']') || is_in('(', ')')
 }
 
 impl Unit {

@@ -58,10 +58,7 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
         (&["isolate", "slow.csv"], "slow.csv: fewer than 10 readings; expected more, or --noise-v"),
         (&["isolate", "slow.csv", "--noise-v", "1"], "slow.csv: rows 1.000 s apart; expected at most 0.6 s"),
         (&["isolate", "sound.csv", "--noise-v", "0"], "--noise-v: noise_v = 0 is not allowed: expected 0.05 to 100 V"),
-        (
-            &["isolate", "sound.csv", "--noise-correlation-s", "1"],
-            "--noise-correlation-s: expected --noise-v beside it",
-        ),
+        (&["isolate", "sound.csv", "--noise-correlation-s", "1"], "--noise-correlation-s: expected --noise-v as well"),
         (&["isolate", "sound.csv", "--limit-v", "9"], "--limit-v: range_v = 9 is not allowed"),
         (&["isolate", "sound.csv", "--alarm-nats", "nan"], "--alarm-nats: alarm_nats = NaN is not allowed"),
         (&["isolate", "sound.csv", "--plant", "no.toml"], "no.toml: cannot be read"),

@@ -141,6 +141,8 @@ fn user_defined_schedules_and_plants_are_simulated() {
     assert_eq!(rows(&report).len(), 5);
     assert!(rows(&report)[0]["printed_with"].is_null());
     assert!((number(&rows(&report)[1], "without") - 80.0).abs() < 1e-9, "the instantaneous share of 200 V");
+    let output = run(folder.path(), &["stair", "--controller", "none"]);
+    assert!(text(&output.stdout).contains("|    with paper controller     |      without controller      |"));
 
     let straight = ["stair", "--input", "s.csv", "--between", "linear", "--json"];
     let report = json(folder.path(), &straight);

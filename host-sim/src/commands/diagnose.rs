@@ -9,7 +9,7 @@ use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, print_error, remark, wrote};
+use host_sim::output::terminal::{json, print, print_error, quoted, remark, wrote};
 use host_sim::signals::on_ctrl_c;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -102,16 +102,6 @@ fn names(measured: &[MeasuredRecord]) -> String {
 pub(super) fn command_line() -> String {
     let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
     iter::once("vsj".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
-}
-
-/// Quotes a word for a shell where necessary.
-fn quoted(word: &str) -> String {
-    let plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 /// Diagnoses records and shows the best causes so far on stderr: as lines, or in one that moves on a terminal.

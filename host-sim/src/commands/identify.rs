@@ -20,7 +20,7 @@ use super::record_arguments::RecordArguments;
 /// beats by more than its noise, with 95 % intervals, compared with the best linear models of order 1 to 4 on held-out segments.
 /// Several records are of one spring; each has its own zero and start, and each is held out as a whole.
 ///
-/// RECORD.csv has the columns time_s, voltage_v (commanded) and the measured one. It must contain every change of the voltage. The
+/// DATA.csv has the columns time_s, voltage_v (commanded) and the measured one. It must contain every change of the voltage. The
 /// voltage of a row applies from its time on, and its reading is taken just after.
 #[derive(Args, Debug)]
 #[command(after_help = "\

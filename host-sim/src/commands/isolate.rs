@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// repeatable
     #[arg(long, value_name = "KEY=PERCENT", allow_hyphen_values = true)]
     known: Vec<ErrorOf>,
-    /// It is known to within the 95 % intervals of this file, what `vsj identify --json` prints; at most 16 MiB
+    /// The nominal spring is known to within the 95 % intervals of this file, what `vsj identify --json` prints; at most 16 MiB
     #[arg(long, value_name = "FILE.json", conflicts_with = "known")]
     identified: Option<PathBuf>,
     /// Standard deviation of a reading, in V; default: from the readings
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         bad_input!("{}: no column `{}`; expected readings", record.name, arguments.column);
     }
     if arguments.noise_correlation_s > 0.0 && arguments.noise_v.is_none() {
-        bad_input!("--noise-correlation-s: expected --noise-v beside it; only white noise is found from the readings");
+        bad_input!("--noise-correlation-s: expected --noise-v as well; only white noise is found from the readings");
     }
     let noise_v = match arguments.noise_v.or_else(|| noise_v(&record)) {
         Some(noise_v) => noise_v,

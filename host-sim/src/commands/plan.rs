@@ -14,20 +14,20 @@ use super::diagnose::command_line;
 
 /// Compute the next experiment: the schedule that decides between the causes that a diagnosis leaves undecided
 ///
-/// From all schedules within range, slew rate and time, the one whose readings differ most between the sets of causes, after each
-/// has bent its parameters to imitate the others. The voltage starts and ends at 0 V, and has no other signs than in the record. If
+/// From all schedules within range, slew rate and time, the one whose predicted readings differ most between the sets of causes,
+/// after the parameters of each have been fitted to the readings that the others predict. The voltage starts and ends at 0 V, and has no other signs than in the record. If
 /// nothing is undecided, the schedule gives the tightest intervals and shows as many causes as possible.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   vsj diagnose record.csv --json > diagnosis.json
   vsj plan diagnosis.json                       the schedule as a table
-  vsj plan diagnosis.json --out out/plan        with schedule.csv and plots
+  vsj plan diagnosis.json --out plan            with schedule, plant file, plots
   vsj plan diagnosis.json --minutes 10 --limit-v 700 --slew-v-per-s 200
   vsj plan diagnosis.json --json | jq .probability
-  vsj stair --input out/plan/schedule.csv --controller none
-  vsj link /dev/ttyACM0 record next.csv --input out/plan/schedule.csv --arm
-  vsj diagnose next.csv                         the decision")]
+  vsj stair --plant plan/plant.toml --input plan/schedule.csv --controller none
+  vsj link /dev/ttyACM0 record next.csv --input plan/schedule.csv --arm
+  vsj diagnose next.csv --plant plan/plant.toml       the decision")]
 pub(crate) struct Arguments {
     /// The diagnosis: what `vsj diagnose --json` prints, or diagnosis.json of its --out; at most 64 MiB
     #[arg(value_name = "DIAGNOSIS.json")]
@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     /// Largest rate of change of the voltage, in V/s; default: steps
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
-    /// Write schedule.csv, plan.json and plots of the schedule and of the predicted readings to this folder
+    /// Write schedule.csv, plan.json, the diagnosis' spring as plant.toml, and plots of the schedule and of the predicted readings to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON object on stdout
@@ -62,14 +62,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut plan = plan(&basis, &request, &name)?;
+    let spring = &basis.experiment(&name)?.plant;
     plan.schedule = arguments.out.as_deref().map(|folder| folder.join(SCHEDULE_FILE).display().to_string());
     let paths = match files {
-        Some(files) => output::write(files, &plan, &command_line())?,
+        Some(files) => output::write(files, &plan, spring, &command_line())?,
         None => Vec::new(),
     };
     print(&if arguments.json {
         json(&plan)?
     } else {
-        text::text(&plan) + "\n" + &text::how_to_play(&plan) + &wrote(&paths)
+        text::text(&plan) + "\n" + &text::how_to_play(&plan, spring) + &wrote(&paths)
     })
 }

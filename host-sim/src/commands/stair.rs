@@ -136,11 +136,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
+    let controlled = options.controller != Controller::None;
     let paths = match &arguments.out {
-        Some(path) => write(path, &answer, options.controller != Controller::None, stride)?,
+        Some(path) => write(path, &answer, controlled, stride)?,
         None => Vec::new(),
     };
-    print(&if arguments.json { json(&answer.report)? } else { stair::text(&answer.report) + &wrote(&paths) })
+    print(&if arguments.json {
+        json(&answer.report)?
+    } else {
+        stair::text(&answer.report, controlled) + &wrote(&paths)
+    })
 }
 
 /// Writes the rows to `path` if it is the name of an MCAP or Parquet file, otherwise rows and plots to this folder.

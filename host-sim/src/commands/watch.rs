@@ -20,7 +20,7 @@ use super::link::session::seconds;
 /// Show and command the running MCU on a full screen, with plots; --emulated needs no board
 ///
 /// Stiffness, voltage, state, limits, faults with their remedy and tick statistics, live. Keys arm, set and step the target, play
-/// a schedule, record, acknowledge; `?` lists them. Space disarms at once; `q` and Ctrl-C disarm and end.
+/// a schedule, record, acknowledge; `?` lists them. Space disarms immediately; `q` and Ctrl-C disarm and end.
 #[derive(Args, Debug)]
 #[command(
     arg_required_else_help = false,

@@ -6,10 +6,11 @@ use paper::stair::{self, LimitedTicks, Row};
 use simulation::experiment::StartsFrom;
 use simulation::response::Response;
 
-/// The rows compared with printed and measured values, explanations of differences, and the steps.
-pub fn text(report: &stair::Report) -> String {
+/// The rows compared with printed and measured values, explanations of differences, and the steps. If the loop is not
+/// `controlled`, the steps are those without a controller, and the rows compare them with the report's controller.
+pub fn text(report: &stair::Report, controlled: bool) -> String {
     let mut text = String::new();
-    rows(&mut text, &report.rows);
+    rows(&mut text, &report.rows, if controlled { "with controller" } else { "with paper controller" });
     if report.printed_compared > 0 {
         let stair::Report { printed_compared, printed_agree, .. } = report;
         line(
@@ -46,7 +47,7 @@ pub fn text(report: &stair::Report) -> String {
 const MOST_ROWS: usize = 40;
 
 /// The table of rows; columns of printed and measured values only where there are any.
-fn rows(text: &mut String, rows: &[Row]) {
+fn rows(text: &mut String, rows: &[Row], with: &str) {
     let printed = rows.iter().any(|row| row.printed_with.is_some());
     let measured = rows.iter().any(|row| row.measured.is_some());
     let of_loop = |name: &str| if printed { format!("{name:^30}|") } else { format!("{name:^21}|") };
@@ -55,7 +56,7 @@ fn rows(text: &mut String, rows: &[Row]) {
     let last = |text: &str| if measured { format!(" {text:>8}") } else { String::new() };
     let names = both(["printed", "reference", "fixed-pt."]);
     let units = both(["[V]", "[V]", "[V]"]);
-    line(text, &format!("               |{}{}", of_loop("with controller"), of_loop("without controller")));
+    line(text, &format!("               |{}{}", of_loop(with), of_loop("without controller")));
     line(text, &format!(" time   target |{names}{names}{}", last("measured")));
     line(text, &format!("  [s]      [V] |{units}{units}{}", last("[V]")));
     for row in rows.iter().take(MOST_ROWS) {

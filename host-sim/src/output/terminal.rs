@@ -52,6 +52,16 @@ pub fn json(value: &impl Serialize) -> Result<String> {
     Ok(serde_json::to_string(value)? + "\n")
 }
 
+/// Quotes a word for a shell where necessary.
+pub fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
 /// One line `wrote PATH` for each written file.
 pub fn wrote(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| format!("wrote {}\n", path.display())).collect()

@@ -100,7 +100,7 @@ impl Recorder {
         let summary = recording.summary();
         let (path, seconds) = (path.display(), summary.seconds);
         let kind = if summary.stiffness == "estimate" { " (estimates, no measurement)" } else { "" };
-        Ok(Some(format!("wrote {path}: {} rows{kind}, {seconds} s, {} lost", summary.rows, summary.lost)))
+        Ok(Some(format!("wrote {path}: {} rows{kind}, {seconds} s, {} samples lost", summary.rows, summary.lost)))
     }
 }
 
@@ -129,7 +129,10 @@ mod tests {
             recorder.add(&Telemetry { tick: 1, ..Telemetry::default() }).unwrap();
             assert_eq!(recorder.progress().unwrap(), Progress { file: name.into(), rows: 1, lost: 0 });
             let wrote = recorder.close().unwrap().unwrap();
-            assert!(wrote.contains(&format!("{name}: 1 rows (estimates, no measurement), 0 s, 0 lost")), "{wrote}");
+            assert!(
+                wrote.contains(&format!("{name}: 1 rows (estimates, no measurement), 0 s, 0 samples lost")),
+                "{wrote}"
+            );
         }
         assert_eq!(std::fs::read_to_string(folder.path().join("out-2.csv")).unwrap(), "kept");
         let error = Recorder::new(Names { first, force: false, is_given: true }).begin(&status(), EVERY).unwrap_err();

@@ -12,7 +12,7 @@ use simulation::schedule::{Reader, Schedule};
 
 use super::message::{Event, Order, Playing};
 use super::recorder::{Names, Recorder};
-use crate::link::{Client, Failure, Patience, Port, heartbeat};
+use crate::link::{Client, Failure, Patience, Port, heartbeat, refusal};
 use crate::output::recording::Every;
 
 /// Pause between two attempts to connect.
@@ -276,7 +276,7 @@ impl<'a> Worker<'a> {
                 Ok(())
             }
             Err(Failure::Refused(reason)) if !ends_session(&reason) => {
-                self.fail(format!("refused: {reason}"));
+                self.fail(format!("refused: {}", refusal(&request, &reason)));
                 Ok(())
             }
             Err(failure) => Err(failure),
@@ -334,10 +334,11 @@ impl<'a> Worker<'a> {
         let volts = player.reader.at(time_s.min(schedule.end_s()));
         let is_new = player.commanded_v.replace(volts) != Some(volts);
         if is_new {
-            match client.order(Request::Set(Desired::ScaledVolts(volts))) {
+            let request = Request::Set(Desired::ScaledVolts(volts));
+            match client.order(request) {
                 Ok((state, _)) => self.state = state,
                 Err(Failure::Refused(reason)) if !ends_session(&reason) => {
-                    self.fail(format!("{name} stopped: {reason}"));
+                    self.fail(format!("{name} stopped: {}", refusal(&request, &reason)));
                     self.stop_playing();
                     return Ok(true);
                 }

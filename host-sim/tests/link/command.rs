@@ -161,6 +161,19 @@ fn an_open_interlock_and_its_fault() {
 }
 
 #[test]
+fn an_acknowledgement_without_a_fault_says_that_there_was_none() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let nothing = "no fault stands, so none was acknowledged";
+    let output = run(&mcu.port, &["acknowledge", "interlock"]);
+    assert_eq!((stdout(&output).as_str(), output.status.code()), ("disarmed, target 0.000 V\n", Some(0)));
+    assert!(String::from_utf8(output.stderr).unwrap().contains(nothing));
+    mcu.with(|shared| shared.fault = Some(supervisor::Fault::Watchdog));
+    mcu.wait_for(State::Faulted);
+    let output = run(&mcu.port, &["acknowledge", "watchdog"]);
+    assert_eq!((stdout(&output).as_str(), output.stderr.as_slice()), ("disarmed, target 0.000 V\n", b"".as_slice()));
+}
+
+#[test]
 fn a_restart_of_the_mcu_is_reported() {
     let mcu = Mcu::on_socket(Setup::default());
     let kept = start(&mcu.port, &["set", "100", "--arm", "--keep", "inf"]);

@@ -167,7 +167,7 @@ fn keys_arm_set_step_and_stop() {
     terminal.press("\x1b[A");
     terminal.wait_for("armed, target 310.000 V");
     terminal.press("701\r");
-    terminal.wait_for("refused: out of range: expected 0 to 700");
+    terminal.wait_for("refused: out of range: expected 0 to 700 V");
     assert!(mcu.wait_for(State::Armed).estimate.to_f64() > 50.0);
     // In an input as well.
     terminal.press("12 ");

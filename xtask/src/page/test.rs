@@ -221,6 +221,8 @@ impl Test {
             );
             same(command, &page, &answer, CONVERGENCE)?;
         }
+        let said = self.browser.text("record-status")?;
+        ensure!(said.ends_with("\u{a0}%."), "a line may break before the unit: {said}");
         self.browser.click("use-plant")?;
         self.control().map(drop)
     }

@@ -8,10 +8,13 @@ use clap::{Args, Subcommand};
 
 /// Export spring and controller for other programs: FMI units, C
 #[derive(Args, Debug)]
-#[command(after_help = "\
+#[command(
+    arg_required_else_help = false,
+    after_help = "\
 Examples:
   vsj export fmu --plant spring.toml        six units, for FMI 2.0 and 3.0
-  vsj export c --plant spring.toml          header, settings and an example")]
+  vsj export c --plant spring.toml          header, settings and an example"
+)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -195,10 +195,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             session.show(done)
         }
         Command::Acknowledge { .. } => {
+            let stood = session.status.fault;
             let done = session.order(Request::Acknowledge(fault))?;
             if done.0 == link::State::Faulted {
                 let next = session.refresh()?.fault;
                 remark(&format!("{}: {fault} is acknowledged; another fault stands: {next}", arguments.port));
+            } else if stood == Fault::NONE {
+                remark(&format!("{}: no fault stands, so none was acknowledged", arguments.port));
             }
             session.show(done)
         }

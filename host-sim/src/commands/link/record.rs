@@ -86,7 +86,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
         report["file"] = json!(arguments.file);
         print(&format!("{report}\n"))
     } else {
-        print(&format!("wrote {file}: {} rows, {} s, {} lost\n", summary.rows, summary.seconds, summary.lost))
+        print(&format!("wrote {file}: {} rows, {} s, {} samples lost\n", summary.rows, summary.seconds, summary.lost))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 use crate::output::diagnosis::tables;
 use crate::output::diagnosis::text;
-use crate::output::page::{Figure, document};
+use crate::output::page::{Figure, document, prose};
 use identify::answer::Verdict;
 use identify::{Diagnosis, Input};
 
@@ -21,7 +21,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         p { span.verdict { (verdict(report.verdict)) } }
         div.sentences {
             p { (text::nominal(&report.nominal, scales)) }
-            @for sentence in text::sentences(&origin.record, report, scales) { p { (sentence) } }
+            @for sentence in text::sentences(&origin.record, report, scales) { p { (prose(&sentence)) } }
         }
         h2 { "Causes" }
         (tables::findings(&report.findings, scales))
@@ -49,7 +49,7 @@ pub(super) fn page(diagnosis: &Diagnosis, origin: &Origin, figures: &[Figure]) -
         h2 { "Next experiment" }
         p {
             @match &report.next_experiment {
-                Some(next) => { (capital(next)) "." }
+                Some(next) => { (prose(&capital(next))) "." }
                 None => { "None needed: no decision is open." }
             }
         }

@@ -9,6 +9,7 @@ use maud::{Markup, html};
 
 use crate::output::diagnosis::number::{interval, number, shown_name};
 use crate::output::diagnosis::tables;
+use crate::output::diagnosis::text::probability;
 use crate::output::page::Row;
 
 /// Explanation of the table.
@@ -94,7 +95,7 @@ fn company(suspect: &Suspect) -> String {
     let with =
         if suspect.with.is_empty() { String::new() } else { format!(", together with {}", suspect.with.join(" and ")) };
     match suspect.probability {
-        Some(probability) => format!("{with}; in the extended simulation, with a probability of {probability:.2}"),
+        Some(value) => format!("{with}; in the extended simulation, with {}", probability(value)),
         None => with,
     }
 }

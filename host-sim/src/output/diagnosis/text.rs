@@ -167,6 +167,11 @@ fn another_spring(report: &answer::Report) -> Option<String> {
     })
 }
 
+/// A probability in words, with two decimals; one that would be rounded to zero is bounded.
+pub(super) fn probability(value: f64) -> String {
+    if value < 0.005 { "a probability below 0.01".into() } else { format!("a probability of {value:.2}") }
+}
+
 /// A relative error in words, with two digits.
 fn off_by(part: f64) -> String {
     let percent = 100.0 * part;
@@ -193,12 +198,12 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
             )
         }
     };
-    format!(
-        "Nominal spring: {}, time constant {}, instantaneous share {}{reading}.",
-        nominal.plant,
-        taus.join(" and "),
-        significant(nominal.share, 3)
-    )
+    // A spring that follows the voltage without delay has a time constant in its plant file, which acts on nothing.
+    let dynamics = match (nominal.share, taus.as_slice()) {
+        (1.0, [_]) => "no dynamics".to_owned(),
+        (share, taus) => format!("time constant {}, instantaneous share {}", taus.join(" and "), significant(share, 3)),
+    };
+    format!("Nominal spring: {}, {dynamics}{reading}.", nominal.plant)
 }
 
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
@@ -275,7 +280,7 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         && let Some(suspect) = report.suspects.first()
     {
         let distance = match suspect.probability {
-            Some(probability) => format!("with a probability of {probability:.2}"),
+            Some(value) => format!("with {}", probability(value)),
             None => format!("{:.1} nats short of a finding", suspect.nats_short),
         };
         sentences.push(format!(
@@ -479,6 +484,23 @@ mod tests {
         report.extended.law_range_v = Some([200.0, 500.0]);
         let law = limits_of_curves(&report, &Scales::default()).remove(0);
         assert!(law.ends_with("above with its end slope, and below it as a straight line to 0 V."), "{law}");
+    }
+
+    #[test]
+    fn a_spring_without_dynamics_has_no_time_constant() {
+        let spring = |share| Nominal { plant: "identify".into(), gain: 1.0, zero: 0.0, share, tau_s: vec![4.0] };
+        assert_eq!(nominal(&spring(1.0), &Scales::default()), "Nominal spring: identify, no dynamics.");
+        let lag = "Nominal spring: identify, time constant 4.000 s, instantaneous share 0.500.";
+        assert_eq!(nominal(&spring(0.5), &Scales::default()), lag);
+    }
+
+    #[test]
+    fn no_probability_is_rounded_to_zero() {
+        for (value, said) in
+            [(0.314, "a probability of 0.31"), (0.005, "a probability of 0.01"), (0.0, "a probability below 0.01")]
+        {
+            assert_eq!(probability(value), said);
+        }
     }
 
     #[test]

@@ -4,6 +4,6 @@ mod document;
 mod figure;
 mod table;
 
-pub(super) use document::document;
+pub(super) use document::{document, prose};
 pub(super) use figure::Figure;
 pub(super) use table::{Row, Table};

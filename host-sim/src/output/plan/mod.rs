@@ -13,13 +13,16 @@ pub mod text;
 
 /// Name of the file with the schedule, for `--input`.
 pub const SCHEDULE_FILE: &str = "schedule.csv";
+/// Name of the file with the spring that the diagnosis compared the record with, for `--plant`.
+const PLANT_FILE: &str = "plant.toml";
 
-/// Writes all files; returns their paths.
+/// Writes all files; returns their paths. `spring` is the plant file of the spring that the diagnosis compared its record with.
 ///
 /// # Errors
 /// Returns the errors of [`Files`].
-pub fn write(mut files: Files, plan: &Plan, command: &str) -> Result<Vec<PathBuf>> {
+pub fn write(mut files: Files, plan: &Plan, spring: &str, command: &str) -> Result<Vec<PathBuf>> {
     files.add(SCHEDULE_FILE, |out| schedule(out, plan, command))?;
+    files.add(PLANT_FILE, |out| out.write_all(spring.as_bytes()))?;
     let answer = serde_json::to_string_pretty(plan).context("plan.json")?;
     files.add("plan.json", |out| writeln!(out, "{answer}"))?;
     for (name, svg) in plots::figures(plan) {

@@ -1,12 +1,17 @@
 //! A plan as text for the terminal.
 
+use std::path::Path;
+
 use identify::plan::Plan;
 use identify::plan::answer::{Part, Separation, Sharper, Suspected};
 use model::Amplifier;
 use simulation::bad_input::number as exact;
+use simulation::plant_file;
 
 use crate::output::cells::line;
 use crate::output::diagnosis::number::number;
+use crate::output::plan::PLANT_FILE;
+use crate::output::terminal::quoted;
 
 /// Largest number of parts that are listed.
 const MOST_PARTS: usize = 45;
@@ -53,25 +58,40 @@ pub fn text(plan: &Plan) -> String {
 }
 
 /// The command lines that play the schedule, as far as they can, then diagnose both records.
-pub fn how_to_play(plan: &Plan) -> String {
+///
+/// `spring` is the plant file of the spring that the diagnosis compared its record with.
+pub fn how_to_play(plan: &Plan, spring: &str) -> String {
     let Some(schedule) = &plan.schedule else {
         return "With --out DIR the schedule is written for `vsj stair --input` and `vsj link PORT record --input`.\n"
             .into();
     };
+    let plant = quoted(&Path::new(schedule).with_file_name(PLANT_FILE).display().to_string());
+    let schedule = quoted(schedule);
     let [low_v, high_v] = plan.range_v;
+    let mut text = String::new();
     if low_v < 0.0 || high_v > Amplifier::MOST_V {
-        return format!(
-            "Measured:  {schedule} with your own voltage source: `vsj stair` and `vsj link` reach 0 to {} V\n\
-             Then:      vsj diagnose next.csv\n",
-            exact(Amplifier::MOST_V)
+        let most_v = exact(Amplifier::MOST_V);
+        line(
+            &mut text,
+            &format!(
+                "Measured:  {schedule} with your own voltage source: `vsj stair` and `vsj link` reach 0 to {most_v} V"
+            ),
         );
+    } else {
+        // The tick refuses springs that a simulation in double precision accepts.
+        if plant_file::parse(PLANT_FILE, spring).is_ok() {
+            let is_beyond = high_v > Amplifier::PAPER.max_v;
+            let most = if is_beyond { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
+            line(
+                &mut text,
+                &format!("Simulated: vsj stair --plant {plant} --input {schedule} --controller none{most}"),
+            );
+        }
+        line(&mut text, &format!("Measured:  vsj link PORT record next.csv --input {schedule} --arm"));
     }
-    let most = if high_v > Amplifier::PAPER.max_v { format!(" --limit-v {}", exact(high_v)) } else { String::new() };
-    format!(
-        "Simulated: vsj stair --input {schedule} --controller none{most}\n\
-         Measured:  vsj link PORT record next.csv --input {schedule} --arm\n\
-         Then:      vsj diagnose next.csv\n"
-    )
+    let columns = if plan.reading_unit == "V" { "" } else { ", with the first record's options for its columns" };
+    line(&mut text, &format!("Then:      vsj diagnose next.csv --plant {plant}{columns}"));
+    text
 }
 
 fn sentence(plan: &Plan) -> String {
@@ -130,7 +150,7 @@ mod tests {
     #[test]
     fn only_commands_that_can_play_the_schedule_are_named() {
         let plan = |low_v, high_v| Plan {
-            schedule: Some("schedule.csv".into()),
+            schedule: Some("my plan/schedule.csv".into()),
             decides: Vec::new(),
             probability: None,
             minutes: 1.0,
@@ -144,11 +164,17 @@ mod tests {
             reading_unit: "V".into(),
             remarks: Vec::new(),
         };
-        assert!(how_to_play(&plan(0.0, 700.0)).contains("vsj stair --input schedule.csv --controller none\n"));
-        assert!(how_to_play(&plan(0.0, 1000.0)).contains("--controller none --limit-v 1000\n"));
+        let spring = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 4.0\n";
+        let text = how_to_play(&plan(0.0, 700.0), spring);
+        let simulated = "vsj stair --plant 'my plan/plant.toml' --input 'my plan/schedule.csv' --controller none\n";
+        assert!(text.contains(simulated), "{text}");
+        assert!(text.ends_with("vsj diagnose next.csv --plant 'my plan/plant.toml'\n"), "{text}");
+        assert!(how_to_play(&plan(0.0, 1000.0), spring).contains("--controller none --limit-v 1000\n"));
         for [low_v, high_v] in [[0.0, 2100.0], [-100.0, 700.0]] {
-            let text = how_to_play(&plan(low_v, high_v));
-            assert!(text.starts_with("Measured:  schedule.csv with your own voltage source"), "{text}");
+            let text = how_to_play(&plan(low_v, high_v), spring);
+            assert!(text.starts_with("Measured:  'my plan/schedule.csv' with your own voltage source"), "{text}");
         }
+        let beyond_the_tick = spring.replace("0.1", "0.999999999");
+        assert!(!how_to_play(&plan(0.0, 700.0), &beyond_the_tick).contains("Simulated"), "the tick refuses it");
     }
 }
