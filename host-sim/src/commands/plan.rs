@@ -15,8 +15,9 @@ use super::diagnose::command_line;
 /// Compute the next experiment: the schedule that decides between the causes that a diagnosis leaves undecided
 ///
 /// From all schedules within range, slew rate and time, the one whose predicted readings differ most between the sets of causes,
-/// after the parameters of each have been fitted to the readings that the others predict. The voltage starts and ends at 0 V, and has no other signs than in the record. If
-/// nothing is undecided, the schedule gives the tightest intervals and shows as many causes as possible.
+/// after the parameters of each have been fitted to the readings that the others predict. The voltage starts and ends at 0 V, and
+/// has no other signs than in the record. If nothing is undecided, the schedule gives the tightest intervals and shows as many
+/// causes as possible.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -41,7 +42,8 @@ pub(crate) struct Arguments {
     /// Largest rate of change of the voltage, in V/s; default: steps
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
-    /// Write schedule.csv, plan.json, the diagnosis' spring as plant.toml, and plots of the schedule and of the predicted readings to this folder
+    /// Write schedule.csv, plan.json, the diagnosis' spring as plant.toml, and plots of the schedule and of the predicted
+    /// readings to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON object on stdout

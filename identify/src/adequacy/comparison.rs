@@ -1,6 +1,6 @@
 //! The ranges of the readings and of the simulation as it is given.
 
-use crate::dimension::Dimension;
+use crate::dimension::{Dimension, significant};
 use crate::fit::engine::Engine;
 use crate::record::scales::Scales;
 
@@ -31,16 +31,15 @@ impl Comparison {
 
     /// The report's sentence on readings that do not follow the voltage.
     pub(crate) fn constant_readings(&self) -> String {
-        let range = |[low, high]: [f64; 2], decimals| {
+        let range = |[low, high]: [f64; 2]| {
             let ends = [low, high].map(|value| self.scales.restored(Dimension::Reading, value));
             let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
-            let low = self.scales.number(Dimension::Reading, low, decimals);
-            format!("{low} to {}", self.scales.with_unit(Dimension::Reading, high, decimals))
+            format!("{} to {}", significant(low, 4), self.scales.four_digits(Dimension::Reading, high))
         };
         format!(
             "The readings, {}, do not follow the voltage, under which the simulation goes from {}",
-            range(self.read, 3),
-            range(self.simulated, 0)
+            range(self.read),
+            range(self.simulated)
         )
     }
 }

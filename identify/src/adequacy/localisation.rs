@@ -81,7 +81,8 @@ impl<'d> Localisation<'d> {
         let mut words = format!(", {percent:.0} % of it from {from} to {to}, in {of_rows:.0} % of the readings");
         if let Some(([low, high], there)) = self.at_voltages {
             let [low, high] = [low, high].map(|voltage| self.scales.shown(Dimension::Voltage, voltage, 0));
-            words += &format!(", and {:.0} % at voltages from {low} to {high}", 100.0 * there.power);
+            let range = if low == high { low } else { format!("voltages from {low} to {high}") };
+            words += &format!(", and {:.0} % at {range}", 100.0 * there.power);
         }
         words
     }
@@ -128,6 +129,6 @@ mod tests {
             ", 71 % of it from 42.0 s to 44.9 s, in 3 % of the readings"
         );
         let at_300 = words(&|row| volts(row) == 300.0);
-        assert!(at_300.ends_with(", and 95 % at voltages from 300 V to 300 V"), "{at_300}");
+        assert!(at_300.ends_with(", and 95 % at 300 V"), "{at_300}");
     }
 }
