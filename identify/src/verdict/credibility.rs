@@ -10,8 +10,7 @@
 //!
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
 //! which do not respond to the voltage and correct no law; findings that exact equality of readings proves do not count), and that is
-//! left. Where
-//! another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! left. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -19,6 +18,7 @@
 //!
 //! and what is then less likely true than untrue is a suspect, no finding. In other records what is improbable beside a likely finding
 //! is a suspect; what else is less likely true than untrue makes the record ambiguous: a law that no cause describes may be in its place.
+//! So do causes that are each likely, if the product of their probabilities is below [`LIKELY_TOGETHER`].
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
 use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
@@ -27,6 +27,9 @@ use crate::verdict::finding::explained;
 
 /// Probability below which nothing is a finding beside a likely one.
 const IMPROBABLE: f64 = 0.1;
+
+/// Probability that all causes are true, below which they do not explain a record: a wrong explanation is worse than one more question.
+const LIKELY_TOGETHER: f64 = 0.8;
 
 /// Causes that do not respond to the voltage, so that they correct no law.
 const APART: [&str; 2] = ["hum", "outliers"];
@@ -74,13 +77,21 @@ pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
 }
 
 /// The causes that are at least as likely true as untrue, where others are less likely than that, so that these may be all; empty if the
-/// simulation may be right as it is given, and `None` elsewhere. Improbable causes beside a likely one leave nothing open: they will be
-/// suspects.
+/// simulation may be right as it is given. Improbable causes beside a likely one leave nothing open: they will be suspects. Where all are
+/// likely but not all together, all but the least likely. `None` elsewhere.
 pub(crate) fn likely_alone(findings: &[Finding]) -> Option<Vec<&'static str>> {
     let beside_likely = findings.iter().any(is_likely_cause);
-    let open = |finding: &Finding| !finding.is_likely() && (!beside_likely || finding.probability >= IMPROBABLE);
-    let likely = findings.iter().filter(|finding| finding.is_likely()).map(|finding| finding.cause);
-    findings.iter().any(open).then(|| likely.collect())
+    let improbable = |finding: &&Finding| beside_likely && !finding.is_likely() && finding.probability < IMPROBABLE;
+    let open: Vec<&Finding> = findings.iter().filter(|finding| !improbable(finding)).collect();
+    let likely: Vec<&Finding> = open.iter().copied().filter(|finding| finding.is_likely()).collect();
+    let causes = |findings: &[&Finding]| findings.iter().map(|finding| finding.cause).collect();
+    if likely.len() < open.len() {
+        return Some(causes(&likely));
+    }
+    let together: f64 = open.iter().map(|finding| finding.probability).product();
+    let least = open.iter().min_by(|a, b| a.probability.total_cmp(&b.probability))?;
+    let others: Vec<&Finding> = open.iter().copied().filter(|finding| finding.cause != least.cause).collect();
+    (together < LIKELY_TOGETHER).then(|| causes(&others))
 }
 
 /// Makes suspects of findings: in a record with the verdict `unexplained` of those that are less likely true than untrue, in another of
@@ -181,12 +192,21 @@ mod tests {
         let open = [probable("hysteresis", 0.9), probable("quantisation", 1.0), probable("delay", 0.3)];
         assert_eq!(likely_alone(&open), Some(vec!["hysteresis", "quantisation"]));
         assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.05)]), None, "a suspect");
-        assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.6)]), None);
+        assert_eq!(likely_alone(&[probable("hysteresis", 0.95), probable("delay", 0.9)]), None);
         assert_eq!(likely_alone(&[probable("delay", 0.3), probable("quantisation", 1.0)]), Some(vec!["quantisation"]));
         let beside_proved = [probable("delay", 0.03), probable("quantisation", 1.0)];
         assert_eq!(likely_alone(&beside_proved), Some(vec!["quantisation"]), "no likely cause but what is proved");
         assert_eq!(likely_alone(&[probable("delay", 0.03)]), Some(Vec::new()));
         assert_eq!(likely_alone(&[]), None);
+    }
+
+    #[test]
+    fn causes_that_are_likely_but_not_together_leave_all_but_the_least_likely_as_an_alternative() {
+        let three = [probable("hysteresis", 0.95), probable("delay", 0.85), probable("drift", 0.9)];
+        assert_eq!(likely_alone(&three), Some(vec!["hysteresis", "drift"]));
+        assert_eq!(likely_alone(&[probable("hysteresis", 0.9), probable("delay", 0.6)]), Some(vec!["hysteresis"]));
+        assert_eq!(likely_alone(&[probable("delay", 0.7)]), Some(Vec::new()));
+        assert_eq!(likely_alone(&[probable("delay", 0.85), probable("quantisation", 1.0)]), None);
     }
 
     #[test]
