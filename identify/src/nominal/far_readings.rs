@@ -5,7 +5,7 @@
 
 use simulation::record::Record;
 
-use crate::nominal::Course;
+use crate::nominal::identified::Course;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::thresholds::empirical::{CHANGE_OF_FULL_SCALE, ROWS_AFTER_CHANGE};
 use crate::stats::thresholds::probability::Z_RARE;

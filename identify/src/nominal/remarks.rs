@@ -4,7 +4,7 @@ use simulation::units::Units;
 
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
-use crate::nominal::STRUCTURED;
+use crate::nominal::models::STRUCTURED;
 use crate::nominal::report::{FarReading, InputLaw, Report};
 
 /// A time constant with a larger ratio of its bounds is hardly known.

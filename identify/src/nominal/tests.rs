@@ -3,8 +3,10 @@ use std::f64::consts::TAU;
 use simulation::record::Row;
 
 use super::*;
-use crate::answer::Verdict;
+use crate::answer::{LinearError, Verdict};
 use crate::examine::{Options, diagnose};
+use crate::nominal::models::{MOST_SPOILED, WORTHWHILE};
+use crate::nominal::report::{Nominal, Quantity, Report};
 use crate::plant::base::Base;
 use crate::stats::scale::normals;
 

@@ -1,0 +1,136 @@
+//! An identified spring: the chosen model in the terms of a spring as an answer and as a plant file, and its course beside each record.
+
+use simulation::plant_file::PlantFile;
+use simulation::record::Record;
+use simulation::units::Units;
+
+use crate::answer::SCHEMA;
+use crate::linear::Series;
+use crate::nominal::canonical::Canonical;
+use crate::nominal::covariance::Spectrum;
+use crate::nominal::intervals::{deviations, directions, not_negative, positive, whole_rows};
+use crate::nominal::models::{BestLinear, Model, Models, scatter};
+use crate::nominal::plant::{self, VoltageRange};
+use crate::nominal::remarks;
+use crate::nominal::report::{Noise, Nominal, Oscillation, Quantity, Report, Start, TimeConstant};
+use crate::stats::scale::root_mean_square;
+use crate::stats::thresholds::probability::Z;
+
+/// An identified spring.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// The answer.
+    pub report: Report,
+    /// The spring as a plant file.
+    pub plant: PlantFile,
+    /// True if the spring was taken to be at rest when each record begins.
+    pub settled: bool,
+    /// The best linear model of the records, which may be of another order or law of the input; `None` if readings were left out.
+    pub linear: Option<BestLinear>,
+    /// The readings of each record and the model of them.
+    pub records: Vec<Course>,
+}
+
+/// One record compared with the model; all vectors have one element per reading that was not left out.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// Name of the record.
+    pub name: String,
+    /// Times, in s.
+    pub time_s: Vec<f64>,
+    /// Commanded voltages, in V.
+    pub voltage_v: Vec<f64>,
+    /// Readings, in their unit.
+    pub reading: Vec<f64>,
+    /// Reading minus model.
+    pub residual: Vec<f64>,
+    /// Reading minus prediction by a fit that did not use the segment.
+    pub held_out: Vec<f64>,
+}
+
+/// Describes the chosen model of some records; the best linear model is left to the caller.
+pub(super) fn described(records: &[Record], models: Models, voltage: VoltageRange, units: &Units) -> Identified {
+    let Models { law, problem, fits, chosen } = &models;
+    let Model { fit, held_out, last_part } = &fits[*chosen];
+    let rows = problem.rows();
+    let spectrum = Spectrum::of(&fit.residual, problem.starts(), &directions(problem, fit));
+    let canonical = Canonical::of(problem, fit);
+    let mut deviations = deviations(problem, fit, &canonical, &spectrum).into_iter();
+    let base = if units.voltage.si == 1.0 { units.voltage.name.as_str() } else { "V" };
+    let reading = units.reading.as_str();
+    let mut quantity = |value: f64, unit: &str| {
+        let half = Z * deviations.next().unwrap_or(0.0);
+        Quantity { value, low: value - half, high: value + half, unit: unit.into() }
+    };
+    // In the order of `Canonical::values`.
+    let gain = quantity(canonical.gain, &format!("{reading}/{base}"));
+    let share = quantity(canonical.share, "");
+    let delay = quantity(canonical.delay, "s");
+    let mut tau_s: Vec<TimeConstant> = canonical
+        .lags
+        .iter()
+        .map(|&(tau, weight)| TimeConstant { tau: positive(quantity(tau, "s")), weight: quantity(weight, "") })
+        .collect();
+    let oscillation: Vec<Oscillation> = canonical
+        .oscillations
+        .iter()
+        .map(|&[frequency, damping, weight, rate_weight]| Oscillation {
+            freq_hz: positive(quantity(frequency, "Hz")),
+            zeta: positive(quantity(damping, "")),
+            weight: quantity(weight, ""),
+            rate_weight: quantity(rate_weight, ""),
+        })
+        .collect();
+    let zeros: Vec<Quantity> = canonical.zeros.iter().map(|&zero| quantity(zero, reading)).collect();
+    let offsets: Vec<Quantity> = canonical.starts.iter().map(|&start| quantity(start, reading)).collect();
+    tau_s.sort_by(|a, b| b.weight.value.abs().total_cmp(&a.weight.value.abs()));
+    let delay_s = if problem.bounds.whole_rows { whole_rows(problem, fit) } else { not_negative(delay) };
+    let nominal = Nominal { gain, zero: zeros[0].clone(), share, delay_s, tau_s };
+    let start = records
+        .iter()
+        .zip(zeros.into_iter().zip(offsets))
+        .map(|(record, (zero, offset))| Start { record: record.name.clone(), zero, offset })
+        .collect();
+    let degrees = (rows.saturating_sub(fit.degrees())).max(1) as f64;
+    let noise = Noise {
+        sigma: (fit.cost / degrees).sqrt(),
+        autocorrelation: Spectrum::neighbours(&fit.residual),
+        scatter: scatter(problem, &fit.residual),
+    };
+    let plant = plant::plant_file(&nominal, &oscillation, *law, voltage, units, problem.spacing);
+    let mut report = Report {
+        schema: SCHEMA,
+        rows,
+        order: *chosen,
+        nominal,
+        oscillation,
+        input_law: *law,
+        rmse: root_mean_square(&fit.residual),
+        held_out_rmse: models.held_out_rmse(),
+        last_40_percent_rmse: *last_part,
+        static_held_out_rmse: root_mean_square(&fits[0].held_out),
+        linear: models.errors(),
+        start,
+        noise,
+        remarks: Vec::new(),
+        left_out: Vec::new(),
+        unit: reading.into(),
+        model: None,
+    };
+    report.remarks = remarks::remarks(&report, problem, fit, units);
+    let course = |(record, (&first, series)): (&Record, (&usize, &Series))| {
+        let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));
+        let part = first..first + series.rows();
+        Course {
+            name: record.name.clone(),
+            time_s: rows().map(|(row, _)| row.time_s).collect(),
+            voltage_v: rows().map(|(row, _)| row.voltage_v).collect(),
+            reading: rows().map(|(_, reading)| reading).collect(),
+            residual: fit.residual[part.clone()].to_vec(),
+            held_out: held_out[part].to_vec(),
+        }
+    };
+    let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
+    let settled = problem.series.iter().all(Series::is_at_rest);
+    Identified { report, plant, settled, linear: None, records }
+}

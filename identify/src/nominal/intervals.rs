@@ -1,0 +1,81 @@
+//! Intervals of 95 % for the quantities of a model: the delta method on the fit's covariance, and which whole rows of delay fit.
+
+use crate::linear::{Fit, Poles, Problem};
+use crate::nominal::canonical::Canonical;
+use crate::nominal::covariance::Spectrum;
+use crate::nominal::models::{REFIT, steps};
+use crate::nominal::report::Quantity;
+use crate::stats::sums::dot;
+use crate::stats::thresholds::probability::Z;
+
+/// Step of a parameter for a difference quotient, in standard deviations of the parameter.
+const DIFFERENCE: f64 = 1e-2;
+/// Records with more readings lose a negligible part of the errors to the fit.
+const LONG: usize = 20_000;
+
+/// The directions in which a fit has taken errors away; none for a long record, which has lost a small part of them.
+pub(super) fn directions(problem: &Problem, fit: &Fit) -> Vec<Vec<f64>> {
+    if problem.rows() > LONG { Vec::new() } else { fit.directions() }
+}
+
+/// Standard deviations of the quantities, in the order of [`Canonical::values`].
+pub(super) fn deviations(problem: &Problem, fit: &Fit, canonical: &Canonical, spectrum: &Spectrum) -> Vec<f64> {
+    let parameters = fit.parameters(problem);
+    let here = canonical.values(canonical).expect("the same numbers of lags and oscillations");
+    let mut derivatives = vec![vec![0.0; parameters.len()]; here.len()];
+    for at in 0..parameters.len() {
+        let mut unit = vec![0.0; parameters.len()];
+        unit[at] = 1.0;
+        let influence = fit.influence(&unit);
+        let step = DIFFERENCE * (spectrum.innovations * dot(&influence, &influence)).sqrt();
+        if step == 0.0 || !step.is_finite() {
+            continue;
+        }
+        let moved = |by: f64| {
+            let mut moved = parameters.clone();
+            moved[at] += by;
+            Canonical::of(problem, &fit.with_parameters(problem, &moved)).values(canonical)
+        };
+        // Near a double pole only one side may have two time constants.
+        let (from, to, width) = match (moved(-step), moved(step)) {
+            (Some(from), Some(to)) => (from, to, 2.0 * step),
+            (None, Some(to)) => (here.clone(), to, step),
+            (Some(from), None) => (from, here.clone(), step),
+            (None, None) => continue,
+        };
+        for (quantity, (from, to)) in from.iter().zip(&to).enumerate() {
+            derivatives[quantity][at] = (to - from) / width;
+        }
+    }
+    derivatives.iter().map(|derivatives| spectrum.deviation(&fit.influence(derivatives))).collect()
+}
+
+/// The interval of a positive quantity, symmetric in its logarithm.
+pub(super) fn positive(quantity: Quantity) -> Quantity {
+    let factor = ((quantity.high - quantity.value) / quantity.value).exp();
+    Quantity { low: quantity.value / factor, high: quantity.value * factor, ..quantity }
+}
+
+pub(super) fn not_negative(quantity: Quantity) -> Quantity {
+    Quantity { low: quantity.low.max(0.0), ..quantity }
+}
+
+/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row is
+/// equivalent to another numerator, so that the interval reaches one row further down.
+pub(super) fn whole_rows(problem: &Problem, fit: &Fit) -> Quantity {
+    const MOST: usize = 4;
+    let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);
+    let degrees = problem.rows().saturating_sub(fit.degrees()).max(1) as f64;
+    let tolerated = Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
+    let rows = (fit.poles.delay / problem.spacing).round();
+    let fits = |rows: f64| {
+        let poles = Poles { delay: rows * problem.spacing, ..fit.poles.clone() };
+        rows >= 0.0
+            && rows * problem.spacing <= problem.bounds.delay.1
+            && problem.refined(poles, steps(problem), REFIT.1).cost <= fit.cost + tolerated
+    };
+    let reach = |sign: f64| (1..=MOST).map(|by| rows + sign * by as f64).take_while(|&rows| fits(rows)).last();
+    let low = (reach(-1.0).unwrap_or(rows) - 1.0).max(0.0) * problem.spacing;
+    let high = reach(1.0).unwrap_or(rows) * problem.spacing;
+    Quantity { value: fit.poles.delay, low, high, unit: "s".into() }
+}
