@@ -10,6 +10,8 @@ use crate::stats::thresholds::probability::Z;
 
 /// Step of a parameter for a difference quotient, in standard deviations of the parameter.
 const DIFFERENCE: f64 = 1e-2;
+/// Ratio to the value from which a bound says nothing.
+const UNKNOWN: f64 = 1e6;
 /// Records with more readings lose a negligible part of the errors to the fit.
 const LONG: usize = 20_000;
 
@@ -50,10 +52,12 @@ pub(super) fn deviations(problem: &Problem, fit: &Fit, canonical: &Canonical, sp
     derivatives.iter().map(|derivatives| spectrum.deviation(&fit.influence(derivatives))).collect()
 }
 
-/// The interval of a positive quantity, symmetric in its logarithm.
+/// The interval of a positive quantity, symmetric in its logarithm; open if it spans more than [`UNKNOWN`] either way.
 pub(super) fn positive(quantity: Quantity) -> Quantity {
     let factor = ((quantity.high - quantity.value) / quantity.value).exp();
-    Quantity { low: quantity.value / factor, high: quantity.value * factor, ..quantity }
+    let (low, high) =
+        if factor < UNKNOWN { (quantity.value / factor, quantity.value * factor) } else { (0.0, f64::INFINITY) };
+    Quantity { low, high, ..quantity }
 }
 
 pub(super) fn not_negative(quantity: Quantity) -> Quantity {

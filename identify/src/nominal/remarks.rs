@@ -10,6 +10,8 @@ use crate::nominal::report::{FarReading, InputLaw, Report};
 /// A time constant with a larger ratio of its bounds is hardly known.
 const HARDLY_KNOWN: f64 = 4.0;
 
+/// A model with a smaller held-out error, relative to that of gain and zero alone, shows a response.
+const RESPONDS: f64 = 0.8;
 /// Readings whose times a remark lists.
 const LISTED: usize = 5;
 
@@ -42,7 +44,13 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
     }
     let time = |seconds: f64| format!("{} {}", significant(seconds / units.time.si, 4), units.time.name);
     if nominal.gain.low <= 0.0 && nominal.gain.high >= 0.0 {
-        remarks.push("The records show no static response: the interval of the gain contains 0.".into());
+        remarks.push(if report.held_out_rmse < RESPONDS * report.static_held_out_rmse {
+            "The records show a response but not where it settles: the interval of the gain contains 0. The spring settles in \
+             a longer time than the records last, or integrates the voltage."
+                .into()
+        } else {
+            "The records show no static response: the interval of the gain contains 0.".into()
+        });
     }
     for bound in problem.on_bounds(&fit.poles) {
         remarks

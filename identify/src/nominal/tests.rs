@@ -115,6 +115,25 @@ fn errors_at_steps_of_the_voltage_are_kept() {
     assert!(report.left_out.is_empty(), "{:?}", report.left_out);
 }
 
+/// A spring that integrates the voltage has no static gain, and a time constant that no record tells has an open interval.
+#[test]
+fn an_integral_of_the_voltage_is_a_response_without_a_gain() {
+    let (noise, steps) = (normals(800), normals(900).split_off(800));
+    let mut sum = 0.0;
+    let row = |row: usize| {
+        let voltage_v = steps[row / 10].signum();
+        sum += voltage_v;
+        Row { line: 0, time_s: row as f64, voltage_v, measured: Some(0.1 * sum + 0.2 * noise[row]) }
+    };
+    let record = Record { name: "integral".into(), rows: (0..800).map(row).collect() };
+    let report = found(&[record]).report;
+    assert!(report.remarks.iter().any(|remark| remark.contains("integrates the voltage")), "{:?}", report.remarks);
+    for lag in &report.nominal.tau_s {
+        let known = lag.tau.high < 1e6 * lag.tau.value && lag.tau.low > 1e-6 * lag.tau.value;
+        assert!(known || (lag.tau.low, lag.tau.high) == (0.0, f64::INFINITY), "{:?}", lag.tau);
+    }
+}
+
 /// Two lags in series behind a law that saturates: no order is right, and each held-out error counts.
 #[test]
 fn order_of_a_spring_that_is_not_linear_has_the_least_held_out_error() {

@@ -263,9 +263,10 @@ fn others(subjects: &[Subject]) -> Result<Vec<Vec<Answer>>> {
 pub fn table(rows: &[Row]) -> String {
     let mut text = "\
 Errors are root mean squares in percent of the standard deviation of the record's readings: on held-out segments, then on the last
-40 % by what was found, structure included, on the first 60 %. `nominal` is what `vsj identify` finds, `extended` what `vsj diagnose --plant identify` adds to it,
-`linear` the best linear output-error model of order 1 to 3, and to 4. PySINDy and SysIdentPy are run on the last 40 % alone. `-`: not
-asked for, or diverged.
+40 % by what was found, structure included, on the first 60 %. `nominal` is what `vsj identify` finds, `extended` what
+`vsj diagnose --plant identify` adds to it: held out are the values of its causes, while the spring under them was identified from
+all rows, so that `extended` without a cause is an error in sample. `linear` is the best linear output-error model of order 1 to 3,
+and to 4. PySINDy and SysIdentPy are run on the last 40 % alone. `-`: not asked for, or diverged.
 
 "
     .to_owned();

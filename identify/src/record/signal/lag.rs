@@ -60,14 +60,24 @@ impl Lag {
     }
 
     /// Advances over one piece of the input and returns the output at its start and end.
-    pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
-        let start = self.value;
-        if duration_s > 0.0 {
-            let tau_s = self.tau_s;
-            let Factors { kept, ramp, held } = *self.factors.of(duration_s, || Factors::of(duration_s, tau_s));
-            // Only the first product depends on the previous piece, so the others can be computed ahead.
-            self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
+    pub fn pass(&mut self, piece: Piece) -> (f64, f64) {
+        if piece.duration_s <= 0.0 {
+            return (self.value, self.value);
         }
+        let tau_s = self.tau_s;
+        let factors = *self.factors.of(piece.duration_s, || Factors::of(piece.duration_s, tau_s));
+        self.advance(factors, piece)
+    }
+
+    /// The same with another time constant for this piece alone, in s.
+    pub fn pass_with(&mut self, tau_s: f64, piece: Piece) -> (f64, f64) {
+        self.advance(Factors::of(piece.duration_s, tau_s), piece)
+    }
+
+    fn advance(&mut self, Factors { kept, ramp, held }: Factors, Piece { from, to, .. }: Piece) -> (f64, f64) {
+        let start = self.value;
+        // Only the first product depends on the previous piece, so the others can be computed ahead.
+        self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
         (start, self.value)
     }
 }
