@@ -155,6 +155,22 @@ fn numbers_of_verdicts_and_places_of_causes_agree() {
     assert!(set.contains(Cause::Delay) && !set.contains(Cause::GainError) && !set.is_empty());
 }
 
+/// A finding holds the size in the unit of its cause, the 95 % interval that the noise leaves it, and the part of the residual's energy
+/// that the cause explains: none if it leaves more than there was.
+#[test]
+fn a_finding_holds_size_interval_and_explained_part() {
+    // 3/8 of 2^1; the information is 2^24 times 2^16 over 2^20.
+    let size = decision::Size { numerator: 3 << 21, denominator: 1 << 24, exponent: 1, scale: 8 };
+    let energies = (8 << 20, 2 << 20);
+    let report = Report { verdict: Verdict::Named(Cause::Hysteresis), since_blocks: 5, size, energies };
+    assert_eq!((report.energies(), report.size()), ((8.0, 2.0), (0.75, 1.0 / 1024.0)));
+    let Finding { cause, other, size, half_width, explained } = report.finding(&Settings::PAPER, 1000.0).unwrap();
+    assert_eq!((cause, other, size, explained), (Cause::Hysteresis, None, 0.75 * 700.0, 0.75));
+    assert!((half_width - 1.96 * 700.0 / 1024.0).abs() < 1e-9, "{half_width}");
+    let worse = Report { energies: (8 << 20, 9 << 20), ..report };
+    assert_eq!(worse.finding(&Settings::PAPER, 1000.0).unwrap().explained, 0.0);
+}
+
 #[test]
 fn two_ambiguous_causes_in_either_order_say_the_same() {
     let (one, other) =
