@@ -243,7 +243,28 @@ pub(super) fn times(gain: WideGain, bits: i32) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::quotient;
+    use super::{Sums, quotient};
+    use crate::isolation::Settings;
+    use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
+    use crate::validated::Validate;
+
+    /// A change of the voltage by at most 1 V in a tick is no jump, in either direction; a larger one counts with its square.
+    #[test]
+    fn a_change_of_more_than_a_volt_is_a_jump() {
+        let config = Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
+        let volt = Signal::ONE.to_bits();
+        for (change, squared_v) in
+            [(volt, 0), (-volt, 0), (volt + 1, 1), (-volt - 1, -1), (2 * volt, 4), (-2 * volt, -4)]
+        {
+            let mut sums = Sums::NEW;
+            for volts in [0, 0, 0, change] {
+                sums.keep(Volts(Signal::from_bits(volts)), ScaledStiffness(Signal::ZERO), None);
+            }
+            sums.add(&config);
+            let jumps = sums.finish(&config).jumps;
+            assert!((jumps - (squared_v << 10)).abs() <= 1, "{change}: {jumps}");
+        }
+    }
 
     #[test]
     #[cfg_attr(miri, ignore = "slow under Miri")]
