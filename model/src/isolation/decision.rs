@@ -364,7 +364,8 @@ impl Decision {
                     .max(thresholds::RIVAL_RATIO * (least - floor))
                     .max(self.doubted);
                 self.bar = least.max(floor) + config.margin + excess;
-                (self.row, self.rivals) = (0, 1 << (self.best & 31));
+                // Above what the best one leaves: it is among them.
+                (self.row, self.rivals) = (0, 0);
                 self.stage = Stage::Rivals;
             }
             Stage::Rivals => {
@@ -446,7 +447,59 @@ impl Decision {
 
 #[cfg(test)]
 mod tests {
-    use super::{reciprocal, shifted, shifted_right};
+    use super::*;
+    use crate::isolation::Settings;
+    use crate::isolation::products::Products;
+    use crate::units::SampleTime;
+    use crate::validated::Validate;
+
+    /// One variance.
+    const ONE: i64 = 1 << 20;
+
+    /// Returns the verdict of as many equal decisions as have to agree, on 50 blocks: where `total` variances are to be explained, of which
+    /// an error of the model may be `doubted`, and the causes leave so much more than the noise.
+    fn verdict(total: i64, doubted: i64, left: &[(Cause, i64)]) -> Verdict {
+        let config = Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
+        let (mut decision, copy, noise) = (Decision::NEW, Products::NEW.copy, 50 * ONE);
+        for _ in 0..thresholds::AGREED {
+            decision.begin(50, doubted);
+            (decision.stage, decision.hypothesis, decision.none) = (Stage::Bar, HYPOTHESES.len() as u8, noise + total);
+            for (cause, left) in left {
+                decision.least[*cause as usize] = noise + left;
+            }
+            decision.best = left.iter().min_by_key(|(_, left)| left).unwrap().0 as u8;
+            while !decision.idle() {
+                decision.step(&config, &copy, false);
+            }
+        }
+        decision.verdict
+    }
+
+    /// A cause is named that leaves no more than noise and a linear signature can leave, if there is something to be explained; each rival
+    /// that does not leave much more makes it ambiguous, and of causes that leave the same the first is named first.
+    #[test]
+    fn a_cause_is_named_up_to_the_thresholds() {
+        use Cause::{Delay, Drift, GainError};
+        let (gain, margin) = (Verdict::Named(GainError), 20 * ONE);
+        let exact = [(GainError, 0)];
+        assert_eq!([margin - 1, margin].map(|total| verdict(total, 0, &exact)), [Verdict::Alarm, gain]);
+        let doubted = 7 * ONE;
+        assert_eq!(
+            [margin - 1, margin].map(|total| verdict(total + 2 * doubted, doubted, &exact)),
+            [Verdict::Alarm, gain]
+        );
+        // Five deviations of the noise, sqrt(2 * 50), and 2^-7 of the total.
+        let most = 60 * ONE;
+        assert_eq!([most, most + 1].map(|left| verdict(1280 * ONE, 0, &[(GainError, left)])), [gain, Verdict::Unknown]);
+        // The margin and 2^-10 of the total.
+        let least = margin + ONE;
+        let rival = |left| verdict(1024 * ONE, 0, &[(GainError, 0), (Drift, left)]);
+        assert_eq!([least - 1, least].map(rival), [Verdict::Ambiguous(GainError, Drift), gain]);
+        let equal = [(Delay, 0), (Drift, 0)];
+        assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(Delay, Drift));
+        let equal = [(GainError, 0), (Delay, ONE), (Drift, ONE)];
+        assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(GainError, Delay));
+    }
 
     /// A shift to the left saturates, and one to the right rounds down, however far it goes.
     #[test]
