@@ -82,8 +82,8 @@ const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
 }
 
 const fn pairs() -> [[(u8, u8); EACH]; CROSS_STEPS] {
-    let ((all, _, count), mut table, mut index) = (distinct(), [[(0, 0); EACH]; CROSS_STEPS], 0);
-    while index < count {
+    let (all, mut table, mut index) = (distinct().0, [[(0, 0); EACH]; CROSS_STEPS], 0);
+    while index < CROSS_STEPS * EACH {
         table[index / EACH][index % EACH] = all[index];
         index += 1;
     }
