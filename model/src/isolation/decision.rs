@@ -127,7 +127,7 @@ const fn at(row: u8, column: u8) -> usize {
 /// Shifts left by `by` bits, or right if it is negative; saturated.
 #[inline(always)]
 fn shifted(value: i64, by: i32) -> i64 {
-    if by < 0 {
+    if by.is_negative() {
         value >> (-by).min(63)
     } else {
         let most = i64::MAX >> by.min(62);
@@ -140,8 +140,8 @@ fn shifted(value: i64, by: i32) -> i64 {
 fn shifted_right(value: i64, by: u8) -> i64 {
     let by = by & 31;
     let (high, low) = ((value >> 32) as i32, value as u32);
-    let low = low >> by | (high << 1 << (31 - by)) as u32;
-    i64::from(high >> by) << 32 | i64::from(low)
+    let low = (low >> by) + (high << 1 << (31 - by)) as u32;
+    (i64::from(high >> by) << 32) + i64::from(low)
 }
 
 /// Returns `2^59 / mantissa`, rounded down, of a mantissa from 2^29 to 2^30 - 1. For a division of 64 bits the MCU calls a function of
@@ -151,10 +151,9 @@ fn reciprocal(mantissa: u32) -> i32 {
     let first = (1u32 << 31).checked_div(mantissa >> 14).unwrap_or(0);
     let rest = (1 << 45) - i64::from(first) * i64::from(mantissa);
     let second = (i64::from(first) << 14) + ((rest * i64::from(first)) >> 31);
-    // Too low by at most two or too large by at most one.
+    // Too low by at most one: so it is for each of the 2^29 mantissas.
     let rest = (1 << 59) - second * i64::from(mantissa);
-    let mantissa = i64::from(mantissa);
-    second as i32 - i32::from(rest < 0) + i32::from(rest >= mantissa) + i32::from(rest >= 2 * mantissa)
+    second as i32 + i32::from(rest >= i64::from(mantissa))
 }
 
 impl Decision {
@@ -267,7 +266,8 @@ impl Decision {
             return;
         }
         let diagonal = self.matrix[at(k, k)];
-        if k == 1 && self.hypothesis == 0 {
+        if k == 1 {
+            // What the nuisance alone leaves: the same number for each hypothesis that has it.
             let double = 2 * i32::from(self.scales[usize::from(last) & 7]);
             self.none = shifted(i64::from(self.matrix[at(last, last)].max(0)), double);
         }
@@ -364,7 +364,8 @@ impl Decision {
                     .max(thresholds::RIVAL_RATIO * (least - floor))
                     .max(self.doubted);
                 self.bar = least.max(floor) + config.margin + excess;
-                (self.row, self.rivals) = (0, 1 << (self.best & 31));
+                // Above what the best one leaves: it is among them.
+                (self.row, self.rivals) = (0, 0);
                 self.stage = Stage::Rivals;
             }
             Stage::Rivals => {
@@ -446,7 +447,70 @@ impl Decision {
 
 #[cfg(test)]
 mod tests {
-    use super::reciprocal;
+    use super::*;
+    use crate::isolation::Settings;
+    use crate::isolation::products::Products;
+    use crate::units::SampleTime;
+    use crate::validated::Validate;
+
+    /// One variance.
+    const ONE: i64 = 1 << 20;
+
+    /// Returns the verdict of as many equal decisions as have to agree, on 50 blocks: where `total` variances are to be explained, of which
+    /// an error of the model may be `doubted`, and the causes leave so much more than the noise.
+    fn verdict(total: i64, doubted: i64, left: &[(Cause, i64)]) -> Verdict {
+        let config = Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
+        let (mut decision, copy, noise) = (Decision::NEW, Products::NEW.copy, 50 * ONE);
+        for _ in 0..thresholds::AGREED {
+            decision.begin(50, doubted);
+            (decision.stage, decision.hypothesis, decision.none) = (Stage::Bar, HYPOTHESES.len() as u8, noise + total);
+            for (cause, left) in left {
+                decision.least[*cause as usize] = noise + left;
+            }
+            decision.best = left.iter().min_by_key(|(_, left)| left).unwrap().0 as u8;
+            while !decision.idle() {
+                decision.step(&config, &copy, false);
+            }
+        }
+        decision.verdict
+    }
+
+    /// A cause is named that leaves no more than noise and a linear signature can leave, if there is something to be explained; each rival
+    /// that does not leave much more makes it ambiguous, and of causes that leave the same the first is named first.
+    #[test]
+    fn a_cause_is_named_up_to_the_thresholds() {
+        use Cause::{Delay, Drift, GainError};
+        let (gain, margin) = (Verdict::Named(GainError), 20 * ONE);
+        let exact = [(GainError, 0)];
+        assert_eq!([margin - 1, margin].map(|total| verdict(total, 0, &exact)), [Verdict::Alarm, gain]);
+        let doubted = 7 * ONE;
+        assert_eq!(
+            [margin - 1, margin].map(|total| verdict(total + 2 * doubted, doubted, &exact)),
+            [Verdict::Alarm, gain]
+        );
+        // Five deviations of the noise, sqrt(2 * 50), and 2^-7 of the total.
+        let most = 60 * ONE;
+        assert_eq!([most, most + 1].map(|left| verdict(1280 * ONE, 0, &[(GainError, left)])), [gain, Verdict::Unknown]);
+        // The margin and 2^-10 of the total.
+        let least = margin + ONE;
+        let rival = |left| verdict(1024 * ONE, 0, &[(GainError, 0), (Drift, left)]);
+        assert_eq!([least - 1, least].map(rival), [Verdict::Ambiguous(GainError, Drift), gain]);
+        let equal = [(Delay, 0), (Drift, 0)];
+        assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(Delay, Drift));
+        let equal = [(GainError, 0), (Delay, ONE), (Drift, ONE)];
+        assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(GainError, Delay));
+    }
+
+    /// A shift to the left saturates, and one to the right rounds down, however far it goes.
+    #[test]
+    fn a_shift_goes_either_way() {
+        assert_eq!([-2, -1, 0, 1, 2].map(|by| shifted(-6, by)), [-2, -3, -6, -12, -24]);
+        assert_eq!([-100, -63].map(|by| (shifted(i64::MAX, by), shifted(i64::MIN, by))), [(0, -1); 2]);
+        assert_eq!([1, 61].map(|by| shifted(i64::MAX, by)), [i64::MAX - 1, 3 << 61]);
+        for (value, by) in [(i64::MAX, 0), (i64::MIN, 1), (0x0123_4567_89ab_cdef, 16), (-0x0123_4567_89ab_cdef, 31)] {
+            assert_eq!(shifted_right(value, by), value >> by);
+        }
+    }
 
     #[test]
     #[cfg_attr(miri, ignore = "slow under Miri")]

@@ -82,8 +82,8 @@ const fn distinct() -> ([(u8, u8); ELEMENTS], [u8; ELEMENTS], usize) {
 }
 
 const fn pairs() -> [[(u8, u8); EACH]; CROSS_STEPS] {
-    let ((all, _, count), mut table, mut index) = (distinct(), [[(0, 0); EACH]; CROSS_STEPS], 0);
-    while index < count {
+    let (all, mut table, mut index) = (distinct().0, [[(0, 0); EACH]; CROSS_STEPS], 0);
+    while index < CROSS_STEPS * EACH {
         table[index / EACH][index % EACH] = all[index];
         index += 1;
     }
@@ -156,5 +156,34 @@ impl Products {
         if mode.halve {
             sums.iter_mut().for_each(|sum| *sum >>= 1);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The elements of a hypothesis are the products of each two of its vectors, the innovation last, row by row; no element and no step
+    /// is without a hypothesis.
+    #[test]
+    fn each_element_is_the_product_of_its_vectors() {
+        let (mut products, mut whitened, mut bits) = (Products::NEW, [[0; GROUP]; SLOTS], 7i32);
+        for value in whitened.as_flattened_mut() {
+            bits = bits.wrapping_mul(69_069).wrapping_add(1);
+            *value = bits >> 8;
+        }
+        (0..STEPS as u32).for_each(|step| products.step(step, Mode { copy: true, ..Mode::NEW }, &whitened));
+        let mut number = 0;
+        for hypothesis in HYPOTHESES {
+            let count = hypothesis.vectors.len();
+            let vector = |place: usize| &whitened[hypothesis.vectors.get(place).copied().unwrap_or(VECTORS)];
+            for (row, column) in (0..=count).flat_map(|row| (row..=count).map(move |column| (row, column))) {
+                let expected = product(vector(row), vector(column));
+                assert_eq!(element(&products.copy, number), expected, "{:?}: {row} {column}", hypothesis.cause);
+                number += 1;
+            }
+        }
+        assert_eq!(number, ELEMENTS);
+        assert_eq!(PLACES.iter().max().map(|place| usize::from(*place) / EACH + 1), Some(STEPS));
     }
 }

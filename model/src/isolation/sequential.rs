@@ -32,6 +32,7 @@ static TESTED: [u8; SMALLEST.len()] = tested();
 const fn tested() -> [u8; SMALLEST.len()] {
     let (mut vectors, mut index) = ([0; SMALLEST.len()], 0);
     while index < SMALLEST.len() {
+        assert!(SMALLEST[index].1 <= 1.0, "the whitened signature of the smallest size fits 32 bits");
         vectors[index] = SMALLEST[index].0 as u8;
         index += 1;
     }
@@ -48,19 +49,6 @@ pub(super) struct Tests {
     pub(super) doubt: i32,
     /// Largest statistic of the present block.
     pub(super) highest: i32,
-}
-
-const _: () = assert!(largest_of_interest() <= 1.0, "the whitened signature of the smallest size fits 32 bits");
-
-const fn largest_of_interest() -> f64 {
-    let (mut largest, mut index) = (0.0, 0);
-    while index < SMALLEST.len() {
-        if SMALLEST[index].1 > largest {
-            largest = SMALLEST[index].1;
-        }
-        index += 1;
-    }
-    largest
 }
 
 /// Adds a bounded increment to a statistic.
@@ -116,5 +104,51 @@ impl Tests {
             highest = highest.max(*upward).max(*downward);
         }
         self.highest = highest;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::isolation::bank::GAIN;
+    use crate::isolation::{Settings, Tolerance};
+    use crate::units::SampleTime;
+    use crate::validated::Validate;
+
+    /// Returns the largest statistic in nats after blocks with these innovations, where the gain's vector is `signature`: both in standard
+    /// deviations. The model's gain is known to within `gain`.
+    fn highest(gain: f64, signature: i32, innovations: &[i32]) -> f64 {
+        let settings = Settings { tolerance: Tolerance { gain, ..Tolerance::NONE }, ..Settings::PAPER };
+        let config = settings.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
+        let (mut tests, mut whitened) = (Tests::NEW, [[0; GROUP]; SLOTS]);
+        for innovation in innovations {
+            whitened[GAIN][0] = signature << 10;
+            whitened[VECTORS][0] = innovation << 10;
+            (0..STEPS).for_each(|step| tests.step(&config, step, &whitened, 0));
+        }
+        f64::from(tests.highest) / ONE
+    }
+
+    /// A statistic goes up and down by the log-likelihood ratios of the documentation, by at most 5 nats up, and never below 0. What an
+    /// error of the model within its tolerance can add counts for no test.
+    #[test]
+    fn a_block_adds_its_log_likelihood_ratio() {
+        let ln_2 = core::f64::consts::LN_2;
+        for (gain, signature, innovations, nats) in [
+            (0.0, 0, &[2, 2, -2][..], 3.0 * (1.5 - ln_2)),
+            (0.0, 0, &[2, 2, -2, 1], 3.0 * (1.5 - ln_2) + 0.375 - ln_2),
+            (0.0, 0, &[100], 5.0),
+            (0.0, 0, &[1, 1], 0.0),
+            // 400 deviations of 0.5 %, the smallest size of interest: s = 2.
+            (0.0, 400, &[3], 2.0 * 3.0 - 2.0),
+            (0.0, 400, &[-3], 2.0 * 3.0 - 2.0),
+            // 400 deviations of 0.2 %: m = 0.8.
+            (0.002, 400, &[3], 2.0 * 3.0 - 2.0 - 2.0 * 0.8),
+            (0.002, 400, &[-3], 2.0 * 3.0 - 2.0 - 2.0 * 0.8),
+            (0.25, 400, &[100, -100], 0.0),
+        ] {
+            let found = highest(gain, signature, innovations);
+            assert!((found - nats).abs() < 0.01, "{gain} {signature} {innovations:?}: {found}, expected {nats}");
+        }
     }
 }

@@ -99,14 +99,12 @@ impl Settings {
     pub fn block_noise(&self, block_s: f64) -> (f64, f64) {
         let readings = self.readings(block_s);
         let count = f64::from(readings);
-        let next =
-            if self.noise_correlation_s > 0.0 { libm::exp(-self.interval_s / self.noise_correlation_s) } else { 0.0 };
+        // 0 for white noise.
+        let next = libm::exp(-self.interval_s / libm::fabs(self.noise_correlation_s));
         let (mut own, mut neighbour, mut power) = (count, 0.0, 1.0);
         for lag in 1..2 * readings {
             power *= next;
-            if lag < readings {
-                own += 2.0 * f64::from(readings - lag) * power;
-            }
+            own += 2.0 * f64::from(readings.saturating_sub(lag)) * power;
             neighbour += (count - libm::fabs(count - f64::from(lag))) * power;
         }
         (self.noise_v * libm::sqrt(own) / count, neighbour / own)

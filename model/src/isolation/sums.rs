@@ -224,9 +224,9 @@ fn quotient(sum: i64, count: u32) -> i32 {
     let magnitude = sum.unsigned_abs();
     let high = (magnitude >> 16) as u32;
     let upper = high.checked_div(count).unwrap_or(0);
-    let rest = (high - upper * count) << 16 | (magnitude as u32 & 0xffff);
+    let rest = ((high - upper * count) << 16) + (magnitude as u32 & 0xffff);
     let whole = (upper << 16) + rest.checked_div(count).unwrap_or(0);
-    (if sum < 0 { whole.wrapping_neg() } else { whole }) as i32
+    (if sum.is_negative() { whole.wrapping_neg() } else { whole }) as i32
 }
 
 /// Returns `value * part / 2^32`, rounded down: a multiplication in place of a shift, since the MCU adds its product in one instruction.
@@ -243,7 +243,54 @@ pub(super) fn times(gain: WideGain, bits: i32) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::quotient;
+    use super::{Config, Sums, quotient};
+    use crate::isolation::Settings;
+    use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
+    use crate::validated::Validate;
+
+    fn config() -> Config {
+        Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize()
+    }
+
+    /// A change of the voltage by at most 1 V in a tick is no jump, in either direction; a larger one counts with its square.
+    #[test]
+    fn a_change_of_more_than_a_volt_is_a_jump() {
+        let volt = Signal::ONE.to_bits();
+        for (change, squared_v) in
+            [(volt, 0), (-volt, 0), (volt + 1, 1), (-volt - 1, -1), (2 * volt, 4), (-2 * volt, -4)]
+        {
+            let mut sums = Sums::NEW;
+            for volts in [0, 0, 0, change] {
+                sums.keep(Volts(Signal::from_bits(volts)), ScaledStiffness(Signal::ZERO), None);
+            }
+            sums.add(&config());
+            let jumps = sums.finish(&config()).jumps;
+            assert!((jumps - (squared_v << 10)).abs() <= 1, "{change}: {jumps}");
+        }
+    }
+
+    /// Readings are pinned from three quarters on that equal the one before, the first of a block counted with the last of the block
+    /// before.
+    #[test]
+    fn three_quarters_of_identical_readings_are_pinned() {
+        let pinned = |readings: [i32; 8]| {
+            let mut sums = Sums::NEW;
+            let mut block = |readings: [i32; 8]| {
+                for four in readings.as_chunks::<4>().0 {
+                    for reading in four {
+                        let reading = ScaledStiffness(Signal::from_num(*reading));
+                        sums.keep(Volts(Signal::ZERO), ScaledStiffness(Signal::ZERO), Some(reading));
+                    }
+                    sums.add(&config());
+                }
+                sums.finish(&config()).pinned
+            };
+            block([5; 8]);
+            block(readings)
+        };
+        assert!(pinned([5, 5, 5, 5, 5, 5, 6, 7]));
+        assert!(!pinned([4, 4, 4, 4, 4, 4, 6, 7]) && !pinned([0, 0, 0, 0, 0, 0, 6, 7]));
+    }
 
     #[test]
     #[cfg_attr(miri, ignore = "slow under Miri")]

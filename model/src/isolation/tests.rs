@@ -43,10 +43,26 @@ fn a_setting_out_of_range_is_rejected_by_name() {
     }
 }
 
+/// Whatever the rate is, a block is at most half of the spring's time constant, and at least twice the time between two readings.
+#[test]
+fn spring_and_sensor_fit_the_length_of_a_block() {
+    for (rate_hz, block_s) in [(1000.0, 0.128), (10_000.0, 0.1024)] {
+        let rejected = |time_constants: f64, intervals: f64| {
+            let mut settings = Settings { interval_s: intervals * block_s, ..Settings::PAPER };
+            settings.plant.time_constant_s = time_constants * block_s;
+            settings.validate(SampleTime::from_rate(rate_hz).unwrap()).err().map(|error| error.field)
+        };
+        assert_eq!(rejected(2.01, 0.49), None, "{rate_hz} Hz");
+        assert_eq!(rejected(1.99, 0.49), Some("plant.time_constant_s"), "{rate_hz} Hz");
+        assert_eq!(rejected(2.01, 0.51), Some("interval_s"), "{rate_hz} Hz");
+    }
+}
+
 #[test]
 fn the_noise_of_a_block_is_that_of_a_mean_of_correlated_readings() {
     let white = Settings::PAPER.block_noise(0.128);
     assert!((white.0 - 1.0 / 128f64.sqrt()).abs() < 1e-12 && white.1 == 0.0);
+    assert_eq!(Settings { noise_correlation_s: -0.0, ..Settings::PAPER }.block_noise(0.128), white);
     // Correlated over far more than a block: the mean is as noisy as a reading, and neighbours agree.
     let slow = Settings { noise_correlation_s: 10.0, ..Settings::PAPER }.block_noise(0.128);
     assert!((slow.0 - 1.0).abs() < 0.01 && (0.98..1.0).contains(&slow.1), "{slow:?}");
@@ -153,6 +169,38 @@ fn numbers_of_verdicts_and_places_of_causes_agree() {
     let set = Causes::NONE.with(Cause::Delay).with(Cause::StuckSensor);
     assert_eq!((set.bits(), Causes::from_bits(set.bits()).iter().count()), (1 << 10 | 1 << 15, 2));
     assert!(set.contains(Cause::Delay) && !set.contains(Cause::GainError) && !set.is_empty());
+}
+
+/// The size of each cause is in the unit that the cause is described with: the coefficient of its vector is per range and per block.
+#[test]
+fn a_size_is_in_the_unit_of_its_cause() {
+    let blocks = f64::from(bank::MOST_BLOCKS);
+    for (cause, unit) in [
+        (Cause::GainError, 1.0),
+        (Cause::Hysteresis, 700.0),
+        (Cause::AmplifierSlew, 0.128 / 700.0),
+        (Cause::Delay, 0.128),
+        (Cause::ReadingOffset, 1.0),
+        (Cause::Drift, 1.0 / (0.128 * blocks)),
+    ] {
+        assert!((Settings::PAPER.unit(cause, 1000.0) / unit - 1.0).abs() < 1e-12, "{cause:?}");
+    }
+}
+
+/// A finding holds the size in the unit of its cause, the 95 % interval that the noise leaves it, and the part of the residual's energy
+/// that the cause explains: none if it leaves more than there was.
+#[test]
+fn a_finding_holds_size_interval_and_explained_part() {
+    // 3/8 of 2^1; the information is 2^24 times 2^16 over 2^20.
+    let size = decision::Size { numerator: 3 << 21, denominator: 1 << 24, exponent: 1, scale: 8 };
+    let energies = (8 << 20, 2 << 20);
+    let report = Report { verdict: Verdict::Named(Cause::Hysteresis), since_blocks: 5, size, energies };
+    assert_eq!((report.energies(), report.size()), ((8.0, 2.0), (0.75, 1.0 / 1024.0)));
+    let Finding { cause, other, size, half_width, explained } = report.finding(&Settings::PAPER, 1000.0).unwrap();
+    assert_eq!((cause, other, size, explained), (Cause::Hysteresis, None, 0.75 * 700.0, 0.75));
+    assert!((half_width - 1.96 * 700.0 / 1024.0).abs() < 1e-9, "{half_width}");
+    let worse = Report { energies: (8 << 20, 9 << 20), ..report };
+    assert_eq!(worse.finding(&Settings::PAPER, 1000.0).unwrap().explained, 0.0);
 }
 
 #[test]

@@ -148,6 +148,7 @@ fn each_fault_is_named_with_its_size_and_to_the_bit() {
         (Cause::StaticNonlinearity, Spring { bow_v: 15.0, ..good }, 15.0, 0x42e8_4a07_7c03_5c19),
         (Cause::AmplifierLimit, Spring { limit_v: 400.0, ..good }, 300.0, 0xa6be_5f59_b659_341e),
         (Cause::Delay, Spring { delay: 50, ..good }, 0.05, 0x2456_8f10_44ab_a317),
+        (Cause::Delay, Spring { delay: 1024, ..good }, 1.024, 0x1cf4_e9df_9a72_e725),
         (Cause::SeriesLag, Spring { lag_s: 0.2, ..good }, 0.2, 0xcbf7_b2c3_8072_f01f),
         (Cause::ReadingOffset, Spring { offset_v: 4.0, ..good }, 4.0, 0xb76c_86a6_8ed6_a779),
         (Cause::Drift, Spring { drift_per_s: 0.001, ..good }, 0.001, 0x6048_c2e2_151b_cdea),
