@@ -109,8 +109,8 @@ impl Verdict {
             Self::Quiet => 0,
             Self::Alarm => 1 << 8,
             Self::Unknown => 2 << 8,
-            Self::Named(cause) => 3 << 8 | cause as u16,
-            Self::Ambiguous(cause, other) => 4 << 8 | (other as u16) << 4 | cause as u16,
+            Self::Named(cause) => (3 << 8) + cause as u16,
+            Self::Ambiguous(cause, other) => (4 << 8) + ((other as u16) << 4) + cause as u16,
         }
     }
 

@@ -163,6 +163,8 @@ fn numbers_of_verdicts_and_places_of_causes_agree() {
     let verdict = Verdict::Ambiguous(Cause::Delay, Cause::SeriesLag);
     assert_eq!(verdict.code(), 4 << 8 | (Cause::SeriesLag as u16) << 4 | Cause::Delay as u16);
     assert_eq!([Verdict::Quiet, Verdict::Alarm, Verdict::Unknown].map(Verdict::code), [0, 256, 512]);
+    let words = (0..5u16).map(|state| Verdict::from_code(state << 8).unwrap().name());
+    assert!(words.eq(["quiet", "alarm", "unknown", "named", "ambiguous"]));
     let known = (0..=u16::MAX).filter_map(|code| Some((code, Verdict::from_code(code)?)));
     assert!(known.clone().all(|(code, verdict)| verdict.code() == code));
     assert_eq!(known.count(), 3 + 16 + 256);
