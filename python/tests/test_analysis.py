@@ -69,18 +69,25 @@ def test_plan_equals_the_command(command, diagnosis, tmp_path):
 
 
 def test_a_bound_that_the_record_does_not_show_is_infinite():
-    """In JSON, which has no infinite number, it is null; a quick lag that one wrong reading shows has such an interval."""
-    time = 0.05 * np.arange(1200)
-    voltage = np.repeat([0.0, 1200.0, 400.0, 2100.0, 900.0, 0.0], 200)
-    relaxed = np.zeros(1200)
-    for row in range(1, 1200):
-        relaxed[row] = relaxed[row - 1] + (voltage[row - 1] - relaxed[row - 1]) * (1 - np.exp(-0.05 / 2))
-    reading = 100 + 0.06 * voltage + 0.24 * relaxed + np.random.default_rng(1).normal(0, 2, 1200)
-    reading[0] = 0
-    found = vsj.identify((time, voltage, reading))
+    """In JSON, which has no infinite number, it is null; an integral of the voltage has time constants that no record shows."""
+    random = np.random.default_rng(0)
+    voltage = np.repeat(random.choice([-1.0, 1.0], 80), 10)
+    reading = 0.1 * np.cumsum(voltage) + random.normal(0, 0.2, 800)
+    found = vsj.identify((np.arange(800.0), voltage, reading))
     assert [(tau.low, tau.high) for tau in found.nominal.tau_s] == [(0, np.inf)] * 2
     assert "[0, inf] s" in repr(found)
     assert json.loads(found.to_json())["nominal"]["tau_s"][0]["high"] is None
+    assert any("integrates the voltage" in remark for remark in found.remarks)
+
+
+def test_a_reading_that_no_spring_made_is_left_out():
+    time = 0.05 * np.arange(1200)
+    voltage = np.repeat([0.0, 1200.0, 400.0, 2100.0, 900.0, 0.0], 200)
+    reading = 100 + 0.3 * voltage + np.random.default_rng(1).normal(0, 2, 1200)
+    reading[700] = 0
+    found = vsj.identify((time, voltage, reading))
+    assert [(far.time_s, far.reading) for far in found.left_out] == [(35.0, 0.0)]
+    assert found.rows == len(found.courses[0][1]["reading"]) == 1199
 
 
 def test_the_index_of_a_frame_is_a_column(sample):
