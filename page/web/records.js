@@ -81,8 +81,9 @@ export class RecordPanel {
 
   /** Asks for the best answer so far; if it was asked for, or if there is none, ends the work. */
   #cancel() {
-    if (this.#stopping || this.#command !== "diagnose" || !this.#engine.stop()) return this.#engine.cancel();
+    const again = this.#stopping;
     this.#stopping = true;
+    if (again || this.#command !== "diagnose" || !this.#engine.stop()) return this.#engine.cancel();
     say("record-status", "Ending the search with its best answer so far. Cancel ends it without an answer.");
   }
 
@@ -126,6 +127,8 @@ export class RecordPanel {
     const onProgress = ({ causes }) => say("so-far", `So far: ${causes || "no cause"}.`);
     try {
       const files = await new Blob(this.#files.map(({ bytes }) => bytes)).arrayBuffer();
+      // Nothing is searched yet that could be ended.
+      if (this.#stopping) throw new Cancelled("cancelled");
       const found = await this.#engine.ask(this.#request(command), { files, onProgress });
       this.#show(command, found);
     } catch (error) {
