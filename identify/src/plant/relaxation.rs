@@ -262,17 +262,15 @@ impl Relaxation {
         let duration_s = piece.duration_s / steps;
         let rise = (piece.to - piece.from) / steps;
         let mut from = piece.from;
-        let mut tau_s = lag.tau_s();
         for _ in 0..steps as usize {
             // The implicit midpoint lies between the output and its input for any step length.
-            let ahead = 0.5 * duration_s / (tau_s + 0.5 * duration_s);
+            let ahead = 0.5 * duration_s / (lag.tau_s() + 0.5 * duration_s);
             let to_come = from + 0.5 * rise - lag.value();
             let middle = lag.value() + (ahead + instantaneous * (1.0 - ahead)) * to_come;
-            tau_s = self.tau_at(middle);
-            lag.pass_with(tau_s, Piece { duration_s, from, to: from + rise });
+            *lag = lag.with_tau(self.tau_at(middle));
+            lag.pass(Piece { duration_s, from, to: from + rise });
             from += rise;
         }
-        *lag = lag.with_tau(tau_s);
         (start, lag.value())
     }
 }

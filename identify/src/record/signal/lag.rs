@@ -1,23 +1,27 @@
 //! A first-order low-pass filter, solved exactly for straight pieces of its input.
 
 use crate::record::signal::piecewise::{Piece, Signal};
-use crate::record::signal::recent::Recent;
 
 /// Added to states so that they do not decay to subnormal numbers, with which processors are slow; far below the resolution of
 /// any other value.
 pub(super) const NO_SUBNORMAL: f64 = 1e-290;
+/// Relative difference up to which durations of pieces are the same: those of a uniformly sampled record differ by rounding.
+pub(super) const SAME_DURATION: f64 = 1e-9;
 
 /// A first-order low-pass filter of unit gain, `tau dx/dt = u - x`, exact for straight pieces of the input `u`.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
     tau_s: f64,
     value: f64,
-    factors: Recent<Factors>,
+    /// Factors of the last duration, and of another one before: a delay divides every row into the same two pieces.
+    factors: [Factors; 2],
 }
 
 /// Weights of state and input over a piece.
 #[derive(Clone, Copy, Debug)]
 struct Factors {
+    /// Duration of the piece, in s.
+    duration_s: f64,
     /// Weight of the state: `exp(-duration / tau)`.
     kept: f64,
     /// Weight of the input at the end of the piece: `1 - tau / duration (1 - kept)`.
@@ -28,20 +32,29 @@ struct Factors {
 
 impl Factors {
     /// Factors of a piece without duration.
-    const NONE: Self = Self { kept: 1.0, ramp: 0.0, held: 0.0 };
+    const NONE: Self = Self { duration_s: 0.0, kept: 1.0, ramp: 0.0, held: 0.0 };
 
     fn of(duration_s: f64, tau_s: f64) -> Self {
         let x = duration_s / tau_s;
         let kept = (-x).exp();
         let ramp = if x > 1e-4 { 1.0 - (1.0 - kept) / x } else { x / 2.0 };
-        Self { kept, ramp, held: 1.0 - kept - ramp }
+        Self { duration_s, kept, ramp, held: 1.0 - kept - ramp }
     }
+
+    fn differ_from(&self, duration_s: f64) -> bool {
+        differ(duration_s, self.duration_s)
+    }
+}
+
+/// True if pieces of two durations, in s, need different factors.
+fn differ(duration_s: f64, known_s: f64) -> bool {
+    (duration_s - known_s).abs() > SAME_DURATION * duration_s
 }
 
 impl Lag {
     /// Returns a filter whose output has settled at `value`.
     pub fn at(tau_s: f64, value: f64) -> Self {
-        Self { tau_s, value, factors: Recent::new(Factors::NONE) }
+        Self { tau_s, value, factors: [Factors::NONE; 2] }
     }
 
     /// Returns the present output.
@@ -60,24 +73,19 @@ impl Lag {
     }
 
     /// Advances over one piece of the input and returns the output at its start and end.
-    pub fn pass(&mut self, piece: Piece) -> (f64, f64) {
-        if piece.duration_s <= 0.0 {
-            return (self.value, self.value);
-        }
-        let tau_s = self.tau_s;
-        let factors = *self.factors.of(piece.duration_s, || Factors::of(piece.duration_s, tau_s));
-        self.advance(factors, piece)
-    }
-
-    /// The same with another time constant for this piece alone, in s.
-    pub fn pass_with(&mut self, tau_s: f64, piece: Piece) -> (f64, f64) {
-        self.advance(Factors::of(piece.duration_s, tau_s), piece)
-    }
-
-    fn advance(&mut self, Factors { kept, ramp, held }: Factors, Piece { from, to, .. }: Piece) -> (f64, f64) {
+    pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.value;
-        // Only the first product depends on the previous piece, so the others can be computed ahead.
-        self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
+        if self.factors[0].differ_from(duration_s) {
+            self.factors.swap(0, 1);
+            if self.factors[0].differ_from(duration_s) {
+                self.factors[0] = Factors::of(duration_s, self.tau_s);
+            }
+        }
+        if duration_s > 0.0 {
+            let Factors { kept, ramp, held, .. } = self.factors[0];
+            // Only the first product depends on the previous piece, so the others can be computed ahead.
+            self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
+        }
         (start, self.value)
     }
 }
@@ -111,13 +119,20 @@ fn pass_bank<const N: usize>(pieces: &mut [Piece], share: f64, lags: &[(f64, Lag
     let weight: [f64; N] = std::array::from_fn(|of| lags[of].0);
     let mut value: [f64; N] = std::array::from_fn(|of| lags[of].1.value);
     let sum = |value: &[f64; N]| (0..N).map(|of| value[of] * weight[of]).sum::<f64>();
-    let mut factors = Recent::new(BankFactors::<N>::NONE);
-    let mut start = sum(&value);
+    // Factors of two durations, as in a [`Lag`].
+    let mut known = [(0.0f64, BankFactors::<N>::NONE); 2];
+    let (mut last, mut start) = (0, sum(&value));
     for pieces in pieces.chunks_mut(PIECES_TO_CHECK) {
         for piece in pieces {
             let Piece { duration_s, from, to } = *piece;
+            if differ(duration_s, known[last].0) {
+                last ^= 1;
+                if differ(duration_s, known[last].0) {
+                    known[last] = (duration_s, BankFactors::of(duration_s, lags));
+                }
+            }
             if duration_s > 0.0 {
-                let BankFactors { kept, ramp, held } = factors.of(duration_s, || BankFactors::of(duration_s, lags));
+                let BankFactors { kept, ramp, held } = &known[last].1;
                 for of in 0..N {
                     value[of] = kept[of] * value[of] + (held[of] * from + ramp[of] * to + NO_SUBNORMAL);
                 }

@@ -8,7 +8,6 @@ mod command;
 mod lag;
 mod oscillator;
 mod piecewise;
-mod recent;
 
 pub use lag::{Lag, pass_lags};
 pub use oscillator::Oscillator;

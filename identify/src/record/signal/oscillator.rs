@@ -1,8 +1,7 @@
 //! A second-order low-pass filter, solved exactly for straight pieces of its input.
 
-use crate::record::signal::lag::NO_SUBNORMAL;
+use crate::record::signal::lag::{NO_SUBNORMAL, SAME_DURATION};
 use crate::record::signal::piecewise::Piece;
-use crate::record::signal::recent::Recent;
 
 /// An underdamped second-order low-pass filter of unit gain, `x'' / w^2 + 2 zeta x' / w + x = u`, exact for straight pieces of the
 /// input `u`.
@@ -16,18 +15,32 @@ pub struct Oscillator {
     x: f64,
     /// Rate of change of `x`, per s.
     rate: f64,
-    /// State-transition matrices.
-    transitions: Recent<[[f64; 2]; 2]>,
+    /// State-transition matrices of the last duration, and of another one before: a delay divides every row into the same two
+    /// pieces.
+    transitions: [Transition; 2],
 }
 
-/// The state-transition matrix of no time.
-const IDENTITY: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
+/// A state-transition matrix over a duration, in s.
+#[derive(Clone, Copy, Debug)]
+struct Transition {
+    duration_s: f64,
+    matrix: [[f64; 2]; 2],
+}
+
+impl Transition {
+    /// The identity over no time.
+    const NONE: Self = Self { duration_s: 0.0, matrix: [[1.0, 0.0], [0.0, 1.0]] };
+
+    fn differs_from(&self, duration_s: f64) -> bool {
+        (duration_s - self.duration_s).abs() > SAME_DURATION * duration_s
+    }
+}
 
 impl Oscillator {
     /// Returns a filter with an angular frequency, in 1/s, and a damping ratio below 1, at an output `x` that changes by `rate`
     /// per second.
     pub fn at(omega: f64, zeta: f64, x: f64, rate: f64) -> Self {
-        Self { omega, zeta, behind_s: 2.0 * zeta / omega, x, rate, transitions: Recent::new(IDENTITY) }
+        Self { omega, zeta, behind_s: 2.0 * zeta / omega, x, rate, transitions: [Transition::NONE; 2] }
     }
 
     /// Returns true if output and rate of change are 0.
@@ -44,12 +57,18 @@ impl Oscillator {
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.x;
         if duration_s > 0.0 {
-            let (omega, zeta) = (self.omega, self.zeta);
-            let step = self.transitions.of(duration_s, || transition(omega, zeta, duration_s));
+            if self.transitions[0].differs_from(duration_s) {
+                self.transitions.swap(0, 1);
+                if self.transitions[0].differs_from(duration_s) {
+                    let matrix = transition(self.omega, self.zeta, duration_s);
+                    self.transitions[0] = Transition { duration_s, matrix };
+                }
+            }
             // The oscillation is around the straight line that the oscillator would settle on.
             let slope = if to == from { 0.0 } else { (to - from) / duration_s };
             let lag = self.behind_s * slope;
             let (dx, dv) = (self.x - (from - lag), self.rate - slope);
+            let step = &self.transitions[0].matrix;
             self.x = to - lag + NO_SUBNORMAL + step[0][0] * dx + step[0][1] * dv;
             self.rate = slope + NO_SUBNORMAL + step[1][0] * dx + step[1][1] * dv;
         }
