@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::diagnosis::text;
 use host_sim::output::diagnosis::{self as output, Origin};
-use host_sim::output::files::Files;
+use host_sim::output::files::{Files, PLANT_FILE};
 use host_sim::output::terminal::{json, print, print_error, quoted, remark, wrote};
 use host_sim::signals::on_ctrl_c;
 use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify};
@@ -144,7 +144,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut diagnosis = with_progress(&records, &options, arguments.progress)?;
     if let Some(folder) = &arguments.out {
-        diagnosis.report.extended.model = Some(folder.join(output::PLANT_FILE).display().to_string());
+        diagnosis.report.extended.model = Some(folder.join(PLANT_FILE).display().to_string());
     }
     let paths = match files {
         Some(files) => output::write(files, &diagnosis, &Arguments::origin(&measured, input))?,

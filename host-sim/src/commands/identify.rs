@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use host_sim::output::files::Files;
+use host_sim::output::files::{Files, PLANT_FILE};
 use host_sim::output::identify::{self as output, Origin};
 use host_sim::output::terminal::{json, print, wrote};
 use identify::{Input, identify};
@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut identified = identify(&records, input, &units)?;
     if let Some(folder) = &arguments.out {
-        identified.report.model = Some(folder.join(output::PLANT_FILE).display().to_string());
+        identified.report.model = Some(folder.join(PLANT_FILE).display().to_string());
     }
     let paths = match files {
         Some(files) => output::write(files, &identified, &units, &Origin { command: command_line() })?,

@@ -15,6 +15,9 @@ use simulation::bad_input;
 
 use crate::signals::{TemporaryFolder, uninterrupted};
 
+/// Name of the file with a spring, for `--plant`.
+pub const PLANT_FILE: &str = "plant.toml";
+
 /// Files that are written to a temporary folder and moved to their places when all are complete.
 pub struct Files {
     folder: PathBuf,

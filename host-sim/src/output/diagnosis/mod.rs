@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use crate::output::files::Files;
+use crate::output::files::{Files, PLANT_FILE};
 use crate::output::page::Figure;
 use figures::figures;
 use identify::Diagnosis;
@@ -25,9 +25,6 @@ mod tables;
 pub mod text;
 
 pub use origin::Origin;
-
-/// Name of the file with the extended spring, for `vsj stair --plant`.
-pub const PLANT_FILE: &str = "plant.toml";
 
 /// Writes all files; returns their paths.
 ///

@@ -29,6 +29,11 @@ pub(in crate::output) fn number(value: f64) -> String {
     significant(value, 4)
 }
 
+/// A probability in words, with two decimals; one that would be rounded to zero is bounded.
+pub(super) fn probability(value: f64) -> String {
+    if value < 0.005 { "a probability below 0.01".into() } else { format!("a probability of {value:.2}") }
+}
+
 /// Name of a parameter without the suffix for its unit where the user's unit is another.
 pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scales) -> &'n str {
     if dimension.size_of_shown_unit(&scales.units) == 1.0 {
@@ -40,6 +45,15 @@ pub(super) fn shown_name<'n>(name: &'n str, dimension: Dimension, scales: &Scale
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_probability_is_rounded_to_zero() {
+        for (value, said) in
+            [(0.314, "a probability of 0.31"), (0.005, "a probability of 0.01"), (0.0, "a probability below 0.01")]
+        {
+            assert_eq!(probability(value), said);
+        }
+    }
 
     #[test]
     fn an_interval_whose_ends_are_shown_alike_is_not_shown() {

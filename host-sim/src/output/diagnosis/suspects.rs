@@ -7,9 +7,8 @@ use identify::dimension::Dimension;
 use identify::record::scales::Scales;
 use maud::{Markup, html};
 
-use crate::output::diagnosis::number::{interval, number, shown_name};
+use crate::output::diagnosis::number::{interval, number, probability, shown_name};
 use crate::output::diagnosis::tables;
-use crate::output::diagnosis::text::probability;
 use crate::output::page::Row;
 
 /// Explanation of the table.

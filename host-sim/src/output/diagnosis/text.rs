@@ -10,7 +10,7 @@ use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
 
 use crate::output::diagnosis::equation;
-use crate::output::diagnosis::number::{interval, linear_name, number, shown_name};
+use crate::output::diagnosis::number::{interval, linear_name, number, probability, shown_name};
 use crate::output::diagnosis::records;
 use crate::output::diagnosis::suspects;
 
@@ -165,11 +165,6 @@ fn another_spring(report: &answer::Report) -> Option<String> {
             significant(ratio, 2)
         )
     })
-}
-
-/// A probability in words, with two decimals; one that would be rounded to zero is bounded.
-pub(super) fn probability(value: f64) -> String {
-    if value < 0.005 { "a probability below 0.01".into() } else { format!("a probability of {value:.2}") }
 }
 
 /// A relative error in words, with two digits.
@@ -492,15 +487,6 @@ mod tests {
         assert_eq!(nominal(&spring(1.0), &Scales::default()), "Nominal spring: identify, no dynamics.");
         let lag = "Nominal spring: identify, time constant 4.000 s, instantaneous share 0.500.";
         assert_eq!(nominal(&spring(0.5), &Scales::default()), lag);
-    }
-
-    #[test]
-    fn no_probability_is_rounded_to_zero() {
-        for (value, said) in
-            [(0.314, "a probability of 0.31"), (0.005, "a probability of 0.01"), (0.0, "a probability below 0.01")]
-        {
-            assert_eq!(probability(value), said);
-        }
     }
 
     #[test]

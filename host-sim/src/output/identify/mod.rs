@@ -6,15 +6,12 @@ use anyhow::{Context, Result};
 use identify::Identified;
 use simulation::units::Units;
 
-use crate::output::files::Files;
+use crate::output::files::{Files, PLANT_FILE};
 
 mod page;
 mod plots;
 mod table;
 pub mod text;
-
-/// Name of the file with the spring, for `--plant`.
-pub const PLANT_FILE: &str = "plant.toml";
 
 /// The origin of an identification.
 #[derive(Clone, Debug)]

@@ -5,8 +5,9 @@ use maud::{Markup, html};
 use simulation::units::Units;
 
 use crate::output::diagnosis::number::number;
+use crate::output::files::PLANT_FILE;
+use crate::output::identify::Origin;
 use crate::output::identify::table::{self, Line};
-use crate::output::identify::{Origin, PLANT_FILE};
 use crate::output::page::{Figure, Row, Table, document};
 
 /// The whole page; texts from files are escaped.

@@ -6,15 +6,13 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use identify::plan::Plan;
 
-use crate::output::files::Files;
+use crate::output::files::{Files, PLANT_FILE};
 
 mod plots;
 pub mod text;
 
 /// Name of the file with the schedule, for `--input`.
 pub const SCHEDULE_FILE: &str = "schedule.csv";
-/// Name of the file with the spring that the diagnosis compared the record with, for `--plant`.
-const PLANT_FILE: &str = "plant.toml";
 
 /// Writes all files; returns their paths. `spring` is the plant file of the spring that the diagnosis compared its record with.
 ///

@@ -10,7 +10,7 @@ use simulation::plant_file;
 
 use crate::output::cells::line;
 use crate::output::diagnosis::number::number;
-use crate::output::plan::PLANT_FILE;
+use crate::output::files::PLANT_FILE;
 use crate::output::terminal::quoted;
 
 /// Largest number of parts that are listed.
