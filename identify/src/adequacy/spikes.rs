@@ -14,12 +14,11 @@ use crate::adequacy::check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 use crate::adequacy::localisation::Localisation;
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
+use crate::record::changes::{changes, follow};
 use crate::record::data::Data;
 use crate::stats::median::median;
 use crate::stats::sums::dot;
-use crate::stats::thresholds::empirical::{
-    CHANGE_OF_FULL_SCALE, FAR_OFF_SCALES, ROWS_AFTER_CHANGE, SHARE_AFTER_CHANGES, SHARE_IN_RUNS,
-};
+use crate::stats::thresholds::empirical::{FAR_OFF_SCALES, ROWS_AFTER_CHANGE, SHARE_AFTER_CHANGES, SHARE_IN_RUNS};
 use crate::stats::thresholds::probability::Z_RARE;
 
 /// Rows whose median is the level of the error before or after a far row.
@@ -67,11 +66,9 @@ pub(crate) fn spikes(engine: &Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
 
 /// Number of far rows just after a change of the voltage, if it is significant.
 fn count_after_changes(far: &[bool], after: &[bool]) -> Option<usize> {
-    let of_rows = |rows: &[bool]| rows.iter().filter(|row| **row).count();
+    let all = far.iter().filter(|far| **far).count();
     let count = far.iter().zip(after).filter(|(far, after)| **far && **after).count();
-    let (all, part) = (of_rows(far) as f64, of_rows(after) as f64 / after.len() as f64);
-    let z = (count as f64 - all * part) / (all * part * (1.0 - part)).sqrt();
-    (count as f64 > SHARE_AFTER_CHANGES.get() * all && z > Z_RARE).then_some(count)
+    (count as f64 > SHARE_AFTER_CHANGES.get() * all as f64 && follow(all, count, after)).then_some(count)
 }
 
 /// Number of all far rows, if significantly many follow another of equal sign.
@@ -112,10 +109,7 @@ pub(crate) fn far_off(noise: &Noise, innovations: &[f64]) -> Vec<bool> {
 fn after_changes(data: &Data, delay_s: f64) -> Vec<bool> {
     let mut after = vec![false; data.rows()];
     let first_from = |time: f64| data.time_s.partition_point(|&at| at < time);
-    for row in 1..data.rows() {
-        if (data.voltage_v[row] - data.voltage_v[row - 1]).abs() <= CHANGE_OF_FULL_SCALE.get() * data.full_scale_v {
-            continue;
-        }
+    for (row, _) in changes(&data.voltage_v, data.full_scale_v) {
         // From the command on: the simulated delay may not be the spring's.
         let leaves = data.time_s[row] + delay_s;
         after[row..first_from(leaves + ROWS_AFTER_CHANGE.get() * data.sample_s)].fill(true);

@@ -15,10 +15,11 @@ use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
 use crate::plant::chain::Chain;
 use crate::plant::initial_state::InitialState;
+use crate::record::changes::changes;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 use crate::record::signal::{Oscillator, Signal};
-use crate::stats::thresholds::empirical::{CHANGE_OF_FULL_SCALE, FASTEST_SERIES_LAG};
+use crate::stats::thresholds::empirical::FASTEST_SERIES_LAG;
 
 pub(super) struct SeriesLag;
 
@@ -68,8 +69,7 @@ fn products(form: usize) -> Option<[f64; 3]> {
 /// Returns true if steps of the voltage have different heights. Otherwise the mean of the response cannot be distinguished from the ramps
 /// of an amplifier's slew rate.
 fn steps_differ(data: &Data) -> bool {
-    let changes = data.voltage_v.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let steps = changes.filter(|change| *change > CHANGE_OF_FULL_SCALE.get() * data.full_scale_v);
+    let steps = changes(&data.voltage_v, data.full_scale_v).map(|(_, change)| change);
     let (low, high) = steps.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), step| (low.min(step), high.max(step)));
     high > DIFFERENT * low
 }

@@ -6,9 +6,9 @@
 use simulation::record::Record;
 
 use crate::nominal::identified::Course;
+use crate::record::changes::{changes, follow};
 use crate::stats::median::{median, robust_deviation};
-use crate::stats::thresholds::empirical::{CHANGE_OF_FULL_SCALE, ROWS_AFTER_CHANGE};
-use crate::stats::thresholds::probability::Z_RARE;
+use crate::stats::thresholds::empirical::ROWS_AFTER_CHANGE;
 
 /// A reading is far off if it deviates from those around it by more scales of all such deviations, ...
 const FAR: f64 = 10.0;
@@ -66,16 +66,13 @@ pub(super) fn of_errors(course: &Course, delay: f64) -> Vec<usize> {
     }
     let (time, voltage) = (&course.time_s, &course.voltage_v);
     let full_scale = voltage.iter().fold(0.0, |most: f64, volts| most.max(volts.abs()));
-    let changes = |row: usize| (voltage[row] - voltage[row - 1]).abs() > CHANGE_OF_FULL_SCALE.get() * full_scale;
     let mut after = vec![false; rows];
-    for row in (1..rows).filter(|&row| changes(row)) {
+    for (row, _) in changes(voltage, full_scale) {
         let last = time.partition_point(|at| *at <= time[row] + delay) + ROWS_AFTER_CHANGE.count();
         after[row..last.min(rows)].fill(true);
     }
-    let part = after.iter().filter(|after| **after).count() as f64 / rows as f64;
-    let (all, count) = (far.len() as f64, far.iter().filter(|row| after[**row]).count() as f64);
-    let follow = count - all * part > Z_RARE * (all * part * (1.0 - part)).sqrt();
-    if follow { Vec::new() } else { far }
+    let just_after = far.iter().filter(|row| after[**row]).count();
+    if follow(far.len(), just_after, &after) { Vec::new() } else { far }
 }
 
 /// Returns the readings whose distance from those around them is large while that of their neighbours is not.
