@@ -22,9 +22,9 @@ const ROUNDING: f64 = 1e-12;
 /// The same after a search, whose steps end when they gain little.
 const CONVERGENCE: f64 = 1e-5;
 /// The same between the numbers of steps of a search.
-const WORK: f64 = 0.05;
+const WORK: f64 = 0.04;
 /// The same between the largest errors of the fixed-point tick, whose rounding depends on the last digit of each parameter.
-const OF_TICK: f64 = 1e-3;
+const OF_TICK: f64 = 1e-4;
 /// A record in the repository.
 const RECORD: &str = "data/sample_hysteresis.csv";
 
