@@ -90,6 +90,9 @@ pub struct Coordinates {
     pub start: Option<FirstSpring>,
     /// Largest magnitude of the record's voltage, in normalised V.
     pub full_scale_v: f64,
+    /// Voltage at which curves over the voltage begin, in normalised V.
+    #[serde(default)]
+    pub origin_v: f64,
     /// Median time between two readings, in normalised s.
     pub sample_s: f64,
     /// True if the readings are uniformly sampled.

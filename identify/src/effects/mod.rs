@@ -16,6 +16,7 @@ pub mod effect;
 mod gain_error;
 mod hum;
 mod hysteresis;
+pub mod identified;
 mod instantaneous_share;
 pub mod model;
 mod offset_levels;

@@ -2,6 +2,7 @@
 
 use crate::effects::catalogue::EFFECTS;
 use crate::effects::effect::{Affects, Coordinate, Effect, Place, Quantity};
+use crate::effects::identified;
 use crate::plant::base::Base;
 use crate::plant::chain::Chain;
 use crate::plant::visited::{Range, Visited};
@@ -49,6 +50,9 @@ impl Block {
 pub struct Model {
     /// The blocks, and the coordinates' values of each.
     pub blocks: Vec<(Block, Vec<f64>)>,
+    /// Coordinates of the relaxation that a fit moves as well, with their values: those of [`identified::coordinates`] if the
+    /// nominal spring was identified from the same readings, where causes that it lacks have biased it; empty if it is known.
+    pub relaxation: Vec<(Coordinate, f64)>,
 }
 
 /// A parameter that is reported of a block.
@@ -68,12 +72,13 @@ impl Model {
         let mut blocks = self.blocks.clone();
         let at = blocks.partition_point(|(other, _)| *other < block);
         blocks.insert(at, (block, point));
-        Self { blocks }
+        Self { blocks, relaxation: self.relaxation.clone() }
     }
 
     /// Returns the model without an effect.
     pub fn without(&self, effect: usize) -> Self {
-        Self { blocks: self.blocks.iter().filter(|(block, _)| block.effect != effect).cloned().collect() }
+        let blocks = self.blocks.iter().filter(|(block, _)| block.effect != effect).cloned().collect();
+        Self { blocks, relaxation: self.relaxation.clone() }
     }
 
     /// Returns true if an effect is in the model, in any form.
@@ -96,17 +101,24 @@ impl Model {
         self.blocks.iter().map(|(block, _)| *block).collect()
     }
 
-    /// Returns the coordinates of all blocks in order.
+    /// Returns the coordinates of all blocks in order, then those of the relaxation. The time constant of a relaxation in which a
+    /// block varies it is that block's.
     pub fn coordinates(&self, data: &Data) -> Vec<Coordinate> {
-        self.blocks.iter().flat_map(|(block, _)| block.coordinates(data)).collect()
+        let varies = self.blocks.iter().any(|(block, _)| block.cause() == "voltage-dependent-time-constant");
+        let of_relaxation = self.relaxation.iter().enumerate().map(|(place, (coordinate, _))| {
+            let fitted = coordinate.fitted && !(varies && place == identified::TIME_CONSTANT);
+            Coordinate { fitted, ..*coordinate }
+        });
+        self.blocks.iter().flat_map(|(block, _)| block.coordinates(data)).chain(of_relaxation).collect()
     }
 
-    /// Returns the points of all blocks in order.
+    /// Returns the points of all blocks in order, then that of the relaxation.
     pub fn points(&self) -> Vec<f64> {
-        self.blocks.iter().flat_map(|(_, point)| point.iter().copied()).collect()
+        let of_relaxation = self.relaxation.iter().map(|(_, value)| *value);
+        self.blocks.iter().flat_map(|(_, point)| point.iter().copied()).chain(of_relaxation).collect()
     }
 
-    /// Replaces the points of all blocks, which must be in order.
+    /// Replaces the points of all blocks and of the relaxation, which must be in order.
     pub fn set_points(&mut self, points: &[f64]) {
         let mut rest = points;
         for (_, point) in &mut self.blocks {
@@ -114,11 +126,16 @@ impl Model {
             point.copy_from_slice(own);
             rest = others;
         }
+        self.relaxation.iter_mut().zip(rest).for_each(|((_, value), point)| *value = *point);
     }
 
     /// Returns the chain of a plant with the effects of the model.
     pub fn chain<'a>(&'a self, base: &'a Base, data: &'a Data) -> Chain<'a> {
         let mut chain = base.chain();
+        if !self.relaxation.is_empty() {
+            let values = self.relaxation.iter().map(|(_, value)| *value);
+            chain.relaxation = identified::moved(&chain.relaxation, values);
+        }
         for (block, point) in &self.blocks {
             block.effect().modify_chain(block.form, point, data, &mut chain);
         }
@@ -175,6 +192,6 @@ impl Model {
         let mentioned = |(block, point): &&(Block, Vec<f64>)| {
             block.effect().unmodelled(block.form, point, data, &chain).is_some_and(|value| value.is_table())
         };
-        Self { blocks: self.blocks.iter().filter(mentioned).cloned().collect() }
+        Self { blocks: self.blocks.iter().filter(mentioned).cloned().collect(), relaxation: Vec::new() }
     }
 }

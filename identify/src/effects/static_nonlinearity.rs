@@ -10,7 +10,8 @@
 //! | uneven | as cubic with the sign of the voltage, `x = u / full scale`: other curves for negative voltages |
 //!
 //! Every curve is fixed at 0 V and at the reference voltage of the nominal spring, where the static gain is 1: what is linear
-//! belongs to `gain-error`, which multiplies the curve, `gain f(u)`.
+//! belongs to `gain-error`, which multiplies the curve, `gain f(u)`. Under a nominal spring that was identified from a record that is
+//! never near 0 V, curve and voltage begin at the [origin](Data::origin_v), and the curve is fixed at both ends of the record's range.
 //!
 //! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
 //! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
@@ -101,18 +102,24 @@ impl Curve {
     }
 }
 
-/// Returns `f / u` of a form at a voltage.
-fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
-    let full_scale_v = data.full_scale_v;
-    let voltage = if matches!(FORMS[form].0, Uneven) { voltage } else { voltage.abs() };
-    FORMS[form].0.secant(point, voltage / full_scale_v, REFERENCE_VOLTAGE_V / full_scale_v)
+/// Returns the range of the voltage from the curve's origin, in V.
+fn range_v(data: &Data) -> f64 {
+    data.full_scale_v - data.origin_v.abs()
 }
 
-/// Returns the number of levels of the voltage other than 0 at which the record has rows.
+/// Returns `f / u` of a form at a voltage, both from the curve's origin.
+fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
+    let range_v = range_v(data);
+    let reference_v = if data.origin_v == 0.0 { REFERENCE_VOLTAGE_V } else { range_v };
+    let voltage = if matches!(FORMS[form].0, Uneven) { voltage } else { voltage.abs() };
+    FORMS[form].0.secant(point, voltage / range_v, reference_v / range_v)
+}
+
+/// Returns the number of levels of the voltage other than the curve's origin at which the record has rows.
 fn levels(data: &Data) -> usize {
     let mut rows = [0; LEVELS];
     for voltage in &data.voltage_v {
-        let part = voltage.abs() / data.full_scale_v.max(f64::MIN_POSITIVE);
+        let part = (voltage - data.origin_v).abs() / range_v(data).max(f64::MIN_POSITIVE);
         let level = (part * LEVELS as f64).round() as usize;
         if level > 0 {
             rows[level.min(LEVELS) - 1] += 1;
@@ -202,11 +209,13 @@ impl Effect for StaticNonlinearity {
         let step = data.full_scale_v * volt_v / f64::from(POINTS);
         let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
         let unit = 10f64.powi(-decimals);
+        let origin = data.origin_v;
+        let value = |voltage: f64| origin + (voltage - origin) * secant(form, point, voltage - origin, data);
         let at = |part: u32| {
             let voltage = (step / unit).round() * unit * f64::from(part);
             let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
             let voltage = voltage / volt_v;
-            Quantity::new(name, Dimension::Stiffness, voltage * secant(form, point, voltage, data))
+            Quantity::new(name, Dimension::Stiffness, value(voltage))
                 .point_of_curve(if FORMS[form].1 { Axis::Stiffness } else { Axis::Law }, voltage)
         };
         (1..=POINTS).map(at).collect()
@@ -225,6 +234,10 @@ impl Effect for StaticNonlinearity {
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let gain = chain.gain;
         let law = if FORMS[form].1 { &mut chain.law_behind } else { &mut chain.law };
-        law.push(move |voltage| voltage * secant(form, point, voltage / gain, data));
+        let origin = gain * data.origin_v;
+        law.push(move |voltage| {
+            let above = voltage - origin;
+            origin + above * secant(form, point, above / gain, data)
+        });
     }
 }

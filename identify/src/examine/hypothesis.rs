@@ -33,7 +33,7 @@ pub(super) fn hypothesise(diagnosis: &mut Diagnosis, record: &Record, options: &
     let normalised = |residual: &[f64]| -> Vec<f64> {
         residual.iter().step_by(every).map(|left| left / normalisation.scales.reading).collect()
     };
-    let base = options.base.normalised(&normalisation);
+    let base = diagnosis.base.clone();
     let rivals = Rivals {
         nominal: base.file(),
         nominal_residual: &normalised(&diagnosis.held_out[0]),

@@ -23,6 +23,13 @@ pub struct Options {
     pub base: Base,
     /// True if the spring may not have settled when a record begins, even if its first readings show no decay.
     pub unsettled: bool,
+    /// True if the simulation was identified from the record that is diagnosed: gain, zero and relaxation are then estimated anew with
+    /// every set of causes, as causes that a linear model lacks bias them.
+    pub identified: bool,
+    /// An identified spring of lower order that is diagnosed as well: a model of higher order imitates what is not linear.
+    pub simpler: Option<Base>,
+    /// Root mean square error of the identified spring on held-out segments, in the reading's unit; `None` if it was not identified.
+    pub held_out_rmse: Option<f64>,
     /// How long causes are searched for.
     pub effort: Effort,
     /// The best linear model of the records, if it is known; it is fitted otherwise.
@@ -45,8 +52,16 @@ impl Options {
     /// # Errors
     /// Those of [`Base::new`].
     pub fn judging(self, identified: Identified) -> Result<Self> {
-        let Identified { plant, settled, linear, .. } = identified;
-        Self { unsettled: !settled, linear, ..self }.judging_file("identify", plant)
+        let Identified { report, plant, simpler, settled, linear, .. } = identified;
+        let held_out_rmse = Some(report.held_out_rmse);
+        let simpler = simpler.map(Base::new).transpose()?;
+        Self { unsettled: !settled, identified: true, simpler, held_out_rmse, linear, ..self }
+            .judging_file("identify", plant)
+    }
+
+    /// Returns the options with a simulation that stays as it was given or identified.
+    pub(super) fn with_fixed_plant(&self) -> Self {
+        Self { identified: false, simpler: None, ..self.clone() }
     }
 
     /// Returns what the user should know who compares readings of another quantity with the paper's spring: its gain and zero are no
@@ -71,6 +86,9 @@ impl Default for Options {
             input: Input::Hold,
             base: Base::paper(),
             unsettled: false,
+            identified: false,
+            simpler: None,
+            held_out_rmse: None,
             effort: Effort::Normal,
             linear: None,
             stop: Stop::default(),

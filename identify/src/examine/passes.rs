@@ -80,6 +80,31 @@ pub(super) struct Normalised {
 }
 
 impl Normalised {
+    /// True if the causes predict held-out segments clearly better than another nominal spring, whose error is given.
+    fn predicts_better_than(&self, error: f64) -> bool {
+        !self.found.report.findings.is_empty() && self.held_out_rmse() < CLEARLY_BETTER * error
+    }
+
+    /// Root mean square of the held-out error, in the reading's unit.
+    fn held_out_rmse(&self) -> f64 {
+        self.normalisations[0].scales.reading.abs() * self.found.report.extended.quality.held_out_rmse
+    }
+
+    /// Returns this diagnosis under a simpler nominal spring if its causes make it predict held-out segments as well as another one, and
+    /// the other one otherwise; the work of both is counted.
+    fn or(mut self, mut other: Self) -> Self {
+        let is_better =
+            !self.found.report.findings.is_empty() && self.held_out_rmse() < AS_GOOD * other.held_out_rmse();
+        let (one, two) = (&mut self.found.report, &mut other.found.report);
+        let work = one.search.work + two.search.work;
+        let allowed = one.search.work + two.search.allowed;
+        let complete = one.complete && two.complete;
+        for report in [one, two] {
+            (report.search.work, report.search.allowed, report.complete) = (work, allowed, complete);
+        }
+        if is_better { self } else { other }
+    }
+
     /// Returns the diagnosis in the units of its records, without the rival sets of causes.
     pub(super) fn without_rivals(self, records: &[Record]) -> Diagnosis {
         self.found.restored(records, &self.normalisations)
@@ -105,10 +130,37 @@ pub(super) fn joint(
     only: Option<&[&'static str]>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Normalised> {
-    let mut normalisations = Normalisation::of_each(records, options.base.file(), options.input, &options.units);
-    normalisations.iter_mut().for_each(|of| of.unsettled = options.unsettled);
+    let rows = records.iter().flat_map(|record| &record.rows).filter(|row| row.measured.is_some()).count();
+    let Some(simpler) = &options.simpler else {
+        let budget = Budget::new(options.effort, rows, options.stop.clone());
+        return under(&options.base, records, options, only, &budget, progress);
+    };
+    let budget = Budget::part(SHARE_OF_SIMPLER, options.effort, rows, options.stop.clone());
+    let simple = under(simpler, records, options, only, &budget, progress)?;
+    if options.held_out_rmse.is_some_and(|of_full| simple.predicts_better_than(of_full)) {
+        return Ok(simple);
+    }
+    let budget = Budget::left(options.effort, rows, budget.spent(), rows, options.stop.clone());
+    let full = under(&options.base, records, options, only, &budget, progress)?;
+    Ok(simple.or(full))
+}
+
+/// The diagnosis under one nominal spring.
+fn under(
+    base: &Base,
+    records: &[Record],
+    options: &Options,
+    only: Option<&[&'static str]>,
+    budget: &Budget,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Normalised> {
+    let mut normalisations = Normalisation::of_each(records, base.file(), options.input, &options.units);
+    for of in &mut normalisations {
+        (of.unsettled, of.identified) = (options.unsettled, options.identified);
+    }
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
-    let base = options.base.normalised(&normalisations[0]);
+    let nominal = nominal(&options.plant, base);
+    let base = base.normalised(&normalisations[0]);
     let prepare = |(record, of)| Data::thinned(record, options.input, 1, of);
     let prepared: Vec<Data> = normalised.iter().zip(&normalisations).map(prepare).collect();
     for (record, data) in records.iter().zip(&prepared) {
@@ -126,11 +178,10 @@ pub(super) fn joint(
         let causes: Vec<&str> = scored.fit.model.blocks.iter().map(|(block, _)| block.cause()).collect();
         progress(&causes.join(", "));
     };
-    let budget = Budget::new(options.effort, data.rows(), options.stop.clone());
-    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget: &budget, only };
+    let examined = ExaminedRecord { records: &normalised, input: options.input, data: &data, budget, only };
     let found = of_readings(&examined, &base, progress);
     let mut found = without_unsupported_terms(&examined, &base, found, progress);
-    found.report.nominal = nominal(options);
+    found.report.nominal = nominal;
     found.report.complete = !budget.is_stopped();
     found.report.search = SearchReport {
         effort: options.effort.name(),
@@ -141,13 +192,19 @@ pub(super) fn joint(
     Ok(Normalised { found, normalisations })
 }
 
-/// The nominal spring for the report.
-fn nominal(Options { plant, base, .. }: &Options) -> Nominal {
+/// The nominal spring for the report, called `plant`.
+fn nominal(plant: &str, base: &Base) -> Nominal {
     let Reading { gain, zero } = base.file().reading.unwrap_or_default();
     let relaxation = &base.file().relaxation;
-    Nominal { plant: plant.clone(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
+    Nominal { plant: plant.to_owned(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
 }
 
+/// Share of the work for the diagnosis under a simpler nominal spring.
+const SHARE_OF_SIMPLER: f64 = 0.6;
+/// Ratio of the held-out errors of a diagnosis under a simpler nominal spring and of the identified one below which no other is needed.
+const CLEARLY_BETTER: f64 = 0.8;
+/// Ratio of the held-out errors up to which a simpler nominal spring is as good as another.
+const AS_GOOD: f64 = 1.02;
 /// Share of the work that is left for one search, the others for its report and for later passes.
 const SHARE_OF_SEARCH: f64 = 0.87;
 /// Share of the work that is left for the search on a part of the rows of a long record.

@@ -42,6 +42,8 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     if let [record] = records {
         return examine(record, options, progress);
     }
+    // A gain and a relaxation that all records share, and a zero for each, are not estimated anew for every set of causes.
+    let options = &options.with_fixed_plant();
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);

@@ -119,6 +119,11 @@ impl Budget {
         Self::of(work(effort, rows) as u64, Some(stop))
     }
 
+    /// Returns a part of the budget for a record with a number of rows.
+    pub fn part(part: f64, effort: Effort, rows: usize, stop: Stop) -> Self {
+        Self::of((part * work(effort, rows)) as u64, Some(stop))
+    }
+
     /// Returns what a diagnosis that has spent some work on a record leaves for a further search, on `rows_searched` of its rows.
     pub fn left(effort: Effort, rows: usize, spent: u64, rows_searched: usize, stop: Stop) -> Self {
         let left = (EXTENSION * work(effort, rows)) as u64;

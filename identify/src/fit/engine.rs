@@ -3,7 +3,10 @@
 //! Each round computes the weights of the rows for the present residual (iteratively reweighted least squares) and
 //! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
+use std::ops::Range;
+
 use crate::effects::effect::FitContext;
+use crate::effects::identified;
 use crate::effects::model::{Block, Model};
 use crate::fit::budget::{Budget, UNLIMITED};
 use crate::fit::known::Known;
@@ -169,12 +172,22 @@ impl<'a> Engine<'a> {
 
     /// Returns true if a search may add a cause.
     pub fn allows(&self, cause: &str) -> bool {
-        self.candidates.is_none_or(|candidates| candidates.contains(&cause))
+        let estimated = self.data.normalisation.identified && identified::contains(&self.base().relaxation, cause);
+        !estimated && self.candidates.is_none_or(|candidates| candidates.contains(&cause))
     }
 
     /// Returns the plant without any effect.
     pub fn base(&self) -> &'a Base {
         self.simulator.base
+    }
+
+    /// Returns the model without any effect, whose relaxation a fit moves if it was identified from the same readings.
+    pub fn simulation(&self) -> Model {
+        let relaxation = match self.data.normalisation.identified {
+            true => identified::coordinates(&self.base().relaxation, self.data),
+            false => Vec::new(),
+        };
+        Model { relaxation, ..Model::default() }
     }
 
     /// Returns the work that fits may do, and that was done.
@@ -189,7 +202,7 @@ impl<'a> Engine<'a> {
 
     /// Returns the same, and the cost of that initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
-        let estimated = self.data.initial_state_unknown || self.data.is_joined();
+        let estimated = self.data.has_nuisances();
         if estimated {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
         } else {
@@ -203,10 +216,15 @@ impl<'a> Engine<'a> {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
-        let states = if self.data.initial_state_unknown { self.kernels.len() as u64 } else { 0 };
+        let states = if self.has_kernels() { self.kernels.len() as u64 } else { 0 };
         let of_row = work::RESIDUAL + work::INITIAL_STATE * states;
         self.budget.spend(self.simulator.take_work() + of_row * residual.len() as u64);
         (residual, initial_state_cost)
+    }
+
+    /// Returns true if the prediction has kernels besides the zero of each of several records.
+    fn has_kernels(&self) -> bool {
+        self.data.initial_state_unknown || self.data.normalisation.identified
     }
 
     /// Returns reading minus prediction of each row, in V, without an estimate of the initial state.
@@ -226,7 +244,7 @@ impl<'a> Engine<'a> {
     /// rest.
     pub fn initial_states(&mut self, model: &Model) -> &[Vec<f64>] {
         self.kernels.clear();
-        if self.data.initial_state_unknown {
+        if self.has_kernels() {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
         }
         &self.kernels
@@ -335,7 +353,13 @@ impl<'a> Engine<'a> {
     }
 
     /// Fits again under the law of the noise of a first fit; returns the more likely of both.
+    ///
+    /// Under a nominal spring that was identified the first fit stays, unless the readings are rounded: an autocorrelation would take
+    /// errors of the model for noise, and the free-running error would grow while the likelihood does.
     pub fn refit(&mut self, first: Fit) -> Fit {
+        if self.ignores_autocorrelation(&first.noise) {
+            return first;
+        }
         let second = self.fit(first.model.clone(), &first.noise);
         if second.log_likelihood >= first.log_likelihood { second } else { first }
     }
@@ -350,11 +374,18 @@ impl<'a> Engine<'a> {
             .collect()
     }
 
+    /// Returns true if a fit is one under independent noise, whatever its law.
+    fn ignores_autocorrelation(&self, law: &Noise) -> bool {
+        self.data.normalisation.identified && law.half_step == 0.0
+    }
+
     fn log(&self, noise: &Noise, residual: &[f64]) -> f64 {
         noise.log_likelihood(residual, self.observed)
     }
 
     fn levenberg_marquardt(&mut self, mut model: Model, law: &Noise, known: &Known, rounds: usize) -> Approach {
+        let independent = self.ignores_autocorrelation(law).then(Noise::default_robust);
+        let law = independent.as_ref().unwrap_or(law);
         let bounds = model.coordinates(self.data);
         let mut points = model.points();
         for (point, bound) in points.iter_mut().zip(&bounds) {
@@ -414,6 +445,13 @@ impl<'a> Engine<'a> {
         (self.jacobian(&fit.model, &fit.noise, &fit.residual), self.terms(&fit.noise, &fit.residual))
     }
 
+    /// Returns the same for the coordinates of the blocks alone.
+    pub fn linearised_by_blocks(&mut self, fit: &Fit) -> (Jacobian, Vec<Term>) {
+        let blocks = fit.model.blocks.iter().map(|(_, point)| point.len()).sum();
+        let jacobian = self.jacobian_of(0..blocks, &Known::default(), &fit.model, &fit.noise, &fit.residual);
+        (jacobian, self.terms(&fit.noise, &fit.residual))
+    }
+
     /// Returns the contribution of each row to the fit.
     pub fn terms(&self, noise: &Noise, residual: &[f64]) -> Vec<Term> {
         let white = noise.innovations(&self.observed.errors(residual));
@@ -422,7 +460,7 @@ impl<'a> Engine<'a> {
 
     /// Returns the initial state of a single record at a model, if it is unknown, and the residual from there.
     fn held_start(&mut self, model: &Model) -> Option<HeldStart> {
-        if !self.data.initial_state_unknown || self.data.is_joined() {
+        if !self.data.has_nuisances() || self.data.is_joined() {
             return None;
         }
         let forced = self.residual_from_rest(model);
@@ -432,6 +470,15 @@ impl<'a> Engine<'a> {
         self.budget.spend(work::INITIAL_STATE * (kernels.len() * forced.len()) as u64);
         let residual = self.residual_from(model, &estimate.start_v);
         Some(HeldStart { estimate, kernels, residual })
+    }
+
+    /// Returns zero, in V, and gain of the reading relative to those of the nominal spring at a model, if that was identified from the
+    /// same readings.
+    pub fn reading_map(&mut self, model: &Model) -> Option<[f64; 2]> {
+        let full_scale_v = self.data.full_scale_v;
+        let start = self.held_start(model).filter(|_| self.data.normalisation.identified)?;
+        let &[.., zero_v, gain_v] = start.estimate.start_v.as_slice() else { return None };
+        Some([zero_v, 1.0 + gain_v / full_scale_v])
     }
 
     /// Returns reading minus prediction of each row, in V, from a given initial state.
@@ -450,10 +497,22 @@ impl<'a> Engine<'a> {
 
     /// Returns the same, with the columns that are known.
     fn jacobian_beside(&mut self, known: &Known, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
+        self.jacobian_of(0..model.points().len(), known, model, noise, residual)
+    }
+
+    /// Returns the same for a range of the coordinates.
+    fn jacobian_of(
+        &mut self,
+        wanted: Range<usize>,
+        known: &Known,
+        model: &Model,
+        noise: &Noise,
+        residual: &[f64],
+    ) -> Jacobian {
         let coordinates = Known::places(model);
         let bounds = model.coordinates(self.data);
         let points = model.points();
-        let places: Vec<usize> = (0..points.len()).filter(|&place| bounds[place].fitted).collect();
+        let places: Vec<usize> = wanted.filter(|&place| bounds[place].fitted).collect();
         let mut nudged = model.clone();
         let held = self.held_start(model);
         let residual = held.as_ref().map_or(residual, |held| &held.residual);

@@ -2,7 +2,8 @@
 //!
 //! For each fold, the points are fitted without the fold's rows, and the prediction is compared with those rows. That
 //! fit is one Newton step from the fit to all rows: without a few segments the log-likelihood is nearly the same
-//! parabola, shifted by the gradient of those segments. The prediction is a simulation at the new points. A block about
+//! parabola, shifted by the gradient of those segments. The prediction is a simulation at the new points. The relaxation of a
+//! nominal spring that was identified stays as all rows place it, like that spring itself. A block about
 //! which the other segments hold no information is removed, because it could not be known without the fold. The choice
 //! of blocks has used all rows; `cargo campaign rivals` learns it from the first 60 % of the record and evaluates it on
 //! the rest.
@@ -101,7 +102,7 @@ struct FullFit<'f> {
 
 impl<'f> FullFit<'f> {
     fn new(engine: &mut Engine, fit: &'f Fit) -> Self {
-        let (jacobian, terms) = engine.linearised(fit);
+        let (jacobian, terms) = engine.linearised_by_blocks(fit);
         let (normal, _) = normal_equations(&jacobian, &terms);
         Self { fit, jacobian, terms, known: normal.diagonal().iter().copied().collect() }
     }

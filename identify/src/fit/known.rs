@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use crate::effects::model::Model;
 use crate::fit::normal_equations::Jacobian;
 
-/// A coordinate of a model: the index of its effect, and that of the coordinate in the effect's block.
-pub(super) type Place = (usize, usize);
+/// A coordinate of a model: the index of its effect, and that of the coordinate in the effect's block; `None` for the relaxation.
+pub(super) type Place = (Option<usize>, usize);
 
 /// Columns of a Jacobian by the coordinate; the default has none.
 #[derive(Debug, Default)]
@@ -32,7 +32,8 @@ impl Known {
 
     /// Returns all coordinates of a model, in the order of its points.
     pub(super) fn places(model: &Model) -> Vec<Place> {
-        let blocks = model.blocks.iter();
-        blocks.flat_map(|(block, point)| (0..point.len()).map(|index| (block.effect, index))).collect()
+        let blocks = model.blocks.iter().map(|(block, point)| (Some(block.effect), point.len()));
+        let all = blocks.chain([(None, model.relaxation.len())]);
+        all.flat_map(|(effect, count)| (0..count).map(move |index| (effect, index))).collect()
     }
 }

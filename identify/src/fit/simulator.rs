@@ -30,9 +30,10 @@ pub struct Simulator<'a> {
     states: Vec<usize>,
     /// Simulators of several records, in their order; empty for a single one.
     parts: Vec<Simulator<'a>>,
-    /// Pieces that went through a block since they were counted last.
-    work: u64,
-    /// Work of a piece relative to one as long as the one before it, whose exponentials are known.
+    /// Work since it was counted last, in units of one piece through one lag.
+    work: f64,
+    /// Fraction of the pieces of the voltage on the electrodes that are not as long as the one before them, so that their
+    /// exponentials are not known.
     irregular: f64,
 }
 
@@ -53,10 +54,11 @@ impl<T> Cached<T> {
     /// Returns true if the result was computed from the same blocks of those that `matter`; otherwise sets the key to these.
     fn update_key_by(&mut self, model: &Model, matter: impl Fn(Affects) -> bool) -> bool {
         let blocks = || model.blocks.iter().filter(|(block, _)| matter(block.affects()));
-        if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks())) {
+        let relaxation = if matter(Affects::Relaxation) { model.relaxation.as_slice() } else { &[] };
+        if self.key.as_ref().is_some_and(|kept| kept.blocks.iter().eq(blocks()) && kept.relaxation == relaxation) {
             return true;
         }
-        self.key = Some(Model { blocks: blocks().cloned().collect() });
+        self.key = Some(Model { blocks: blocks().cloned().collect(), relaxation: relaxation.to_vec() });
         false
     }
 }
@@ -65,28 +67,31 @@ impl<T> Cached<T> {
 const LEAST_KERNEL: f64 = 1e-200;
 
 /// Work of one piece in each stage, in units of one lag.
-const AMPLIFIER: u64 = 2;
-const STATIC_RESPONSE: u64 = 3;
-const RELAXATION: u64 = 1;
-const RESPONSE: u64 = 4;
-const INITIAL_STATE: u64 = 14;
-/// Further work of a piece that is not as long as the one before it.
+const AMPLIFIER: f64 = 2.0;
+const STATIC_RESPONSE: f64 = 3.0;
+const RESPONSE: f64 = 4.0;
+const INITIAL_STATE: f64 = 14.0;
+/// Further work of a piece that is not as long as the one before it, relative to one that is.
 const IRREGULAR: f64 = 3.0;
 
+/// Returns the fraction of a signal's pieces that are not as long as the one before them.
+fn irregular(signal: &Signal) -> f64 {
+    signal.new_durations() as f64 / signal.len().max(1) as f64
+}
+
 /// Returns the work of a block on a response.
-fn response_work(block: Block, signal: &Signal) -> u64 {
-    if block.affects() == Affects::Response { RESPONSE * signal.len() as u64 } else { 0 }
+fn response_work(block: Block, signal: &Signal, irregular: f64) -> f64 {
+    let of_piece = if block.affects() == Affects::Response { RESPONSE } else { 0.0 };
+    (1.0 + IRREGULAR * irregular) * of_piece * signal.len() as f64
 }
 
 impl<'a> Simulator<'a> {
     /// Prepares simulations of one record.
     pub fn new(data: &'a Data, base: &'a Base) -> Self {
-        let pieces = data.command.len().max(1) as f64;
-        let irregular = 1.0 + IRREGULAR * data.command.changes_of_duration() as f64 / pieces;
         Self {
             data,
             base,
-            irregular,
+            irregular: irregular(&data.command),
             signal: Signal::default(),
             levels_v: Vec::new(),
             amplified: Cached::default(),
@@ -96,14 +101,13 @@ impl<'a> Simulator<'a> {
             kernels: Cached::default(),
             states: Vec::new(),
             parts: data.parts.iter().map(|part| Self::new(&part.data, base)).collect(),
-            work: 0,
+            work: 0.0,
         }
     }
 
-    /// Returns the number of pieces that went through a block since the last call.
+    /// Returns the work since the last call.
     pub fn take_work(&mut self) -> u64 {
-        let own = (self.irregular * std::mem::take(&mut self.work) as f64) as u64;
-        own + self.parts.iter_mut().map(Self::take_work).sum::<u64>()
+        std::mem::take(&mut self.work) as u64 + self.parts.iter_mut().map(Self::take_work).sum::<u64>()
     }
 
     /// Computes the prediction of a model for each row, in V.
@@ -154,14 +158,35 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    /// Computes the same, and the change of the prediction for each initial state that is 1 V away from rest at the
-    /// first row.
+    /// Computes the same, and its kernels: the change of the prediction for each initial state that is 1 V away from rest at the
+    /// first row, if that is unknown, and for a zero and a gain that are off by 1 V at the full scale, if the nominal spring was
+    /// identified.
     pub fn run_with_initial_states(&mut self, model: &Model, readings: &mut Vec<f64>, kernels: &mut Vec<Vec<f64>>) {
         if !self.parts.is_empty() {
             kernels.clear();
             return self.run_parts(model, readings, Some(kernels));
         }
         self.run(model, readings);
+        kernels.clear();
+        if self.data.initial_state_unknown {
+            kernels.extend_from_slice(self.initial_state_kernels(model));
+        }
+        if self.data.normalisation.identified {
+            kernels.push(vec![1.0; readings.len()]);
+            let full_scale_v = self.data.full_scale_v;
+            kernels.push(self.response.value.iter().map(|stiffness| stiffness / full_scale_v).collect());
+        }
+        if model.blocks.iter().any(|(block, _)| block.affects() == Affects::Readings) {
+            for kernel in kernels {
+                kernel.iter_mut().zip(&self.response.value).for_each(|(moved, stiffness)| *moved += stiffness);
+                self.modify_readings(model, kernel);
+                kernel.iter_mut().zip(&*readings).for_each(|(moved, reading)| *moved -= reading);
+            }
+        }
+    }
+
+    /// Returns the response of the stiffness to each initial state, of the model that was simulated last.
+    fn initial_state_kernels(&mut self, model: &Model) -> &[Vec<f64>] {
         let chain = model.chain(self.base, self.data);
         let depends = chain.initial_state_depends_on_voltage();
         let matter = |affects| affects <= Affects::Response && (depends || affects != Affects::StaticResponse);
@@ -181,37 +206,40 @@ impl<'a> Simulator<'a> {
                 (state, states) = (state + 1, start.states());
             }
         }
-        kernels.clone_from(&self.kernels.value);
-        if model.blocks.iter().any(|(block, _)| block.affects() == Affects::Readings) {
-            for kernel in kernels {
-                kernel.iter_mut().zip(&self.response.value).for_each(|(moved, stiffness)| *moved += stiffness);
-                self.modify_readings(model, kernel);
-                kernel.iter_mut().zip(&*readings).for_each(|(moved, reading)| *moved -= reading);
-            }
-        }
+        &self.kernels.value
     }
 
-    /// Computes the prediction of a model from an initial state: `start_v` holds the offset, in V, of each state that had a kernel
-    /// when these were computed last. Of a single record.
+    /// Computes the prediction of a model from an initial state, zero and gain: `start_v` holds the offset, in V, of each that had a
+    /// kernel when these were computed last. Of a single record.
     pub fn run_from(&mut self, model: &Model, start_v: &[f64], readings: &mut Vec<f64>) {
-        let mut offsets_v = vec![0.0; self.states.last().map_or(0, |last| last + 1)];
-        self.states.iter().zip(start_v).for_each(|(&state, &offset_v)| offsets_v[state] = offset_v);
         self.run(model, readings);
-        let chain = model.chain(self.base, self.data);
-        self.free_response(model, &chain, &mut InitialState::of(offsets_v));
-        let output = self.data.scales().output;
         readings.clone_from(&self.response.value);
-        readings.iter_mut().zip(self.signal.at_rows()).for_each(|(reading, free)| *reading += output * free);
+        let mut rest = start_v;
+        if self.data.initial_state_unknown {
+            let (states_v, others_v) = start_v.split_at(self.states.len());
+            let mut offsets_v = vec![0.0; self.states.last().map_or(0, |last| last + 1)];
+            self.states.iter().zip(states_v).for_each(|(&state, &offset_v)| offsets_v[state] = offset_v);
+            let chain = model.chain(self.base, self.data);
+            self.free_response(model, &chain, &mut InitialState::of(offsets_v));
+            let output = self.data.scales().output;
+            readings.iter_mut().zip(self.signal.at_rows()).for_each(|(reading, free)| *reading += output * free);
+            rest = others_v;
+        }
+        if let [zero_v, gain_v] = rest {
+            let gain = gain_v / self.data.full_scale_v;
+            let stiffness = self.response.value.iter();
+            readings.iter_mut().zip(stiffness).for_each(|(reading, stiffness)| *reading += zero_v + gain * stiffness);
+        }
         self.modify_readings(model, readings);
     }
 
     /// Sets `signal` to the response of the stiffness to an initial state, of the model that was simulated last.
     fn free_response(&mut self, model: &Model, chain: &Chain, start: &mut InitialState) {
         chain.initial_state_response(&self.amplified.value, &mut self.signal, start, &self.levels_v);
-        self.work += INITIAL_STATE * self.signal.len() as u64;
+        self.work += (1.0 + IRREGULAR * self.irregular) * INITIAL_STATE * self.signal.len() as f64;
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, start);
-            self.work += response_work(*block, &self.signal);
+            self.work += response_work(*block, &self.signal, self.irregular);
         }
     }
 
@@ -226,15 +254,16 @@ impl<'a> Simulator<'a> {
                 if !self.amplified.update_key(model, Affects::Amplifier) {
                     self.amplified.value.clone_from(&data.command);
                     chain.amplify(&mut self.amplified.value);
-                    self.work += AMPLIFIER * self.amplified.value.len() as u64;
+                    self.irregular = irregular(&self.amplified.value);
+                    self.work += AMPLIFIER * self.amplified.value.len() as f64;
                 }
                 self.static_response.value.clone_from(&self.amplified.value);
                 chain.static_response(&mut self.static_response.value);
-                self.work += STATIC_RESPONSE * self.static_response.value.len() as u64;
+                self.work += STATIC_RESPONSE * self.static_response.value.len() as f64;
             }
             signal.clone_from(&self.static_response.value);
             chain.relax(signal, &self.amplified.value, &mut self.levels_v);
-            self.work += RELAXATION * chain.work(signal);
+            self.work += chain.work(signal, self.irregular);
         }
         if model.blocks.iter().all(|(block, _)| block.affects() != Affects::Response) {
             return signal;
@@ -242,7 +271,7 @@ impl<'a> Simulator<'a> {
         self.signal.clone_from(signal);
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, &mut InitialState::at_rest());
-            self.work += response_work(*block, &self.signal);
+            self.work += response_work(*block, &self.signal, self.irregular);
         }
         &self.signal
     }

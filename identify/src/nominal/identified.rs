@@ -23,6 +23,9 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
+    /// The best spring of the lowest order that is nearly as good, as a plant file; `None` if what is left is noise, or no lower order is:
+    /// what is not linear makes a model of higher order better, which imitates it.
+    pub simpler: Option<PlantFile>,
     /// True if the spring was taken to be at rest when each record begins.
     pub settled: bool,
     /// The best linear model of the records, which may be of another order or law of the input; `None` if readings were left out.
@@ -49,9 +52,15 @@ pub struct Course {
 }
 
 /// Describes the chosen model of some records; the best linear model is left to the caller.
-pub(super) fn described(records: &[Record], models: Models, voltage: VoltageRange, units: &Units) -> Identified {
-    let Models { law, problem, fits, chosen } = &models;
-    let Model { fit, held_out, last_part } = &fits[*chosen];
+pub(super) fn described(records: &[Record], models: &Models, voltage: VoltageRange, units: &Units) -> Identified {
+    let simpler = models.simpler().map(|order| of_order(records, models, order, voltage, units).plant);
+    Identified { simpler, ..of_order(records, models, models.chosen, voltage, units) }
+}
+
+/// Describes the model of one order.
+fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageRange, units: &Units) -> Identified {
+    let Models { law, problem, fits, .. } = models;
+    let Model { fit, held_out, last_part } = &fits[order];
     let rows = problem.rows();
     let spectrum = Spectrum::of(&fit.residual, problem.starts(), &directions(problem, fit));
     let canonical = Canonical::of(problem, fit);
@@ -101,12 +110,12 @@ pub(super) fn described(records: &[Record], models: Models, voltage: VoltageRang
     let mut report = Report {
         schema: SCHEMA,
         rows,
-        order: *chosen,
+        order,
         nominal,
         oscillation,
         input_law: *law,
         rmse: root_mean_square(&fit.residual),
-        held_out_rmse: models.held_out_rmse(),
+        held_out_rmse: root_mean_square(held_out),
         last_40_percent_rmse: *last_part,
         static_held_out_rmse: root_mean_square(&fits[0].held_out),
         linear: models.errors(),
@@ -132,5 +141,5 @@ pub(super) fn described(records: &[Record], models: Models, voltage: VoltageRang
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
     let settled = problem.series.iter().all(Series::is_at_rest);
-    Identified { report, plant, settled, linear: None, records }
+    Identified { report, plant, simpler: None, settled, linear: None, records }
 }

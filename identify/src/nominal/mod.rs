@@ -123,7 +123,7 @@ fn of_all(records: &[Record], input: Input, units: &Units) -> Identified {
         }
     }
     let voltage = VoltageRange { full_scale_v: full_scale, both_signs };
-    Identified { linear, ..described(records, models, voltage, units) }
+    Identified { linear, ..described(records, &models, voltage, units) }
 }
 
 #[cfg(test)]

@@ -68,10 +68,10 @@ impl Grid {
             rows.push(row(read, voltage_v, Some(0.0)));
         }
         let record = Record { name: String::new(), rows };
-        let Coordinates { full_scale_v, sample_s, uniform, .. } = *coordinates;
+        let Coordinates { full_scale_v, origin_v, sample_s, uniform, .. } = *coordinates;
         let data = Data::thinned(&record, Input::Hold, 1, &normalisation(coordinates));
         // The points of the models are relative to the first record, and the spring is at rest at the start.
-        Data { full_scale_v, record_sample_s: sample_s, uniform, initial_state_unknown: false, ..data }
+        Data { full_scale_v, origin_v, record_sample_s: sample_s, uniform, initial_state_unknown: false, ..data }
     }
 }
 
@@ -80,5 +80,5 @@ pub(super) fn normalisation(coordinates: &Coordinates) -> Normalisation {
     let Coordinates { second_s, volt_v, zero, reading, output, share, even, start, .. } = *coordinates;
     let scales = Scales { start_s: 0.0, second_s, volt_v, zero, reading, output, ..Scales::default() };
     let start = start.map(|it| Start { gain: it.gain, tau_s: it.tau_s, share: it.share, offset: it.offset });
-    Normalisation { scales, share, even, start, unsettled: false }
+    Normalisation { scales, share, even, start, unsettled: false, identified: false }
 }

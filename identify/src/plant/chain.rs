@@ -134,11 +134,12 @@ impl<'a> Chain<'a> {
         self.memory.table().is_some() || self.relaxation.varies() || self.relaxation.falling_tau_s.is_some()
     }
 
-    /// Returns the work of the linear part on a signal, in units of one lag.
-    pub fn work(&self, signal: &Signal) -> u64 {
+    /// Returns the work of the linear part on a signal, in units of one lag; `irregular` is the fraction of its pieces that are not as
+    /// long as the one before them.
+    pub fn work(&self, signal: &Signal, irregular: f64) -> f64 {
         match self.exact_series() {
-            Some(relaxation) => relaxation.work(signal),
-            None => self.relaxation.work(signal) + (self.series_s.len() * signal.len()) as u64,
+            Some(relaxation) => relaxation.work(signal, irregular),
+            None => self.relaxation.work(signal, irregular) + (self.series_s.len() * signal.len()) as f64,
         }
     }
 

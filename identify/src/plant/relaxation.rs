@@ -37,11 +37,14 @@ const LARGEST_WEIGHT: f64 = 1e9;
 const MOST_STEPS: f64 = 200.0;
 
 /// Work of a step whose exponential is computed, relative to one whose exponential is known.
-const EXPONENTIAL: u64 = 4;
+const EXPONENTIAL: f64 = 4.0;
 /// Work of an integration step where the spring's state sets the time constant.
-const STEP_BY_STATE: u64 = 16;
+const STEP_BY_STATE: f64 = 16.0;
 /// Work of one piece of an oscillation, in units of one lag.
-const WORK_OF_MODE: usize = 6;
+const WORK_OF_MODE: f64 = 6.0;
+/// Further work of a piece that is not as long as the one before it, through one of a bank of lags and through an oscillation.
+const IRREGULAR_LAG: f64 = 1.0;
+const IRREGULAR_MODE: f64 = 25.0;
 
 /// Parameters of the relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,6 +122,7 @@ impl Relaxation {
         };
         let tau_high_s = self.varies().then_some(self.tau_high_s);
         let tau_high_at_v = file.relaxation.tau_high_at_v;
+        file.modes = self.oscillations().collect();
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s, tau_high_at_v };
     }
 
@@ -167,8 +171,8 @@ impl Relaxation {
     }
 
     /// Returns the oscillations that contribute.
-    fn oscillations(&self) -> impl Iterator<Item = Mode> {
-        self.modes.into_iter().filter(|mode| mode.weight != 0.0 || mode.rate_weight != 0.0)
+    pub fn oscillations(&self) -> impl Iterator<Item = Mode> {
+        self.modes.into_iter().filter(contributes)
     }
 
     /// Returns true if the time constant depends on the voltage.
@@ -239,14 +243,19 @@ impl Relaxation {
         });
     }
 
-    /// Returns the number of steps of all lags over all pieces of a signal.
-    pub fn work(&self, signal: &Signal) -> u64 {
-        let lags = 1 + self.parts().count() + WORK_OF_MODE * self.oscillations().count();
-        match self.by_state.filter(|_| self.varies()) {
-            Some(_) => signal.durations_s().map(|duration_s| STEP_BY_STATE * self.steps(duration_s) as u64).sum(),
-            None if self.varies() => (lags - 1 + EXPONENTIAL as usize) as u64 * signal.len() as u64,
-            None => (lags * signal.len()) as u64,
-        }
+    /// Returns the number of steps of all lags over all pieces of a signal, of which a fraction is `irregular`: not as long as the piece
+    /// before it, so that every lag and oscillation needs its exponentials anew.
+    pub fn work(&self, signal: &Signal, irregular: f64) -> f64 {
+        let pieces = signal.len() as f64;
+        let lag = 1.0 + IRREGULAR_LAG * irregular;
+        let lags = self.parts().count() as f64 * lag;
+        let modes = self.oscillations().count() as f64 * (WORK_OF_MODE + IRREGULAR_MODE * irregular);
+        let first = match self.by_state.filter(|_| self.varies()) {
+            Some(_) => return signal.durations_s().map(|duration_s| STEP_BY_STATE * self.steps(duration_s)).sum(),
+            None if self.varies() => EXPONENTIAL,
+            None => lag,
+        };
+        pieces * (first + lags + modes)
     }
 
     /// Returns the number of integration steps of a piece where the spring's state sets the time constant.
@@ -273,6 +282,11 @@ impl Relaxation {
         }
         (start, lag.value())
     }
+}
+
+/// Returns true if an oscillation contributes to the response.
+pub fn contributes(mode: &Mode) -> bool {
+    mode.weight != 0.0 || mode.rate_weight != 0.0
 }
 
 /// Returns what an oscillation contributes at start and end of a piece of its input.

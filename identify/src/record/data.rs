@@ -32,6 +32,9 @@ pub struct Data {
     pub command: Signal,
     /// Largest magnitude of the commanded voltage, in V.
     pub full_scale_v: f64,
+    /// Voltage at which curves over the voltage begin, in V: 0, or that of the smallest magnitude if the nominal spring was identified
+    /// from a record that is never near 0 V, where nothing shows the curve's part below.
+    pub origin_v: f64,
     /// Median time between the rows in use, in s.
     pub sample_s: f64,
     /// Median time between all rows of the record, of which only some may be in use, in s.
@@ -92,6 +95,7 @@ impl Data {
             _ => all.into_iter().step_by(every).collect(),
         });
         let full_scale_v = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let origin_v = if normalisation.identified { origin(&voltage_v) } else { 0.0 };
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let sample_s = median(&mut gaps).unwrap_or(1.0);
         let record_sample_s = sample_s / every as f64;
@@ -114,6 +118,7 @@ impl Data {
             reading,
             command,
             full_scale_v,
+            origin_v,
             sample_s,
             record_sample_s,
             uniform,
@@ -148,6 +153,7 @@ impl Data {
             reading: Vec::new(),
             command: records[0].command.clone(),
             full_scale_v,
+            origin_v: 0.0,
             sample_s,
             record_sample_s,
             uniform,
@@ -190,6 +196,12 @@ impl Data {
         !self.parts.is_empty()
     }
 
+    /// Returns true if a model's prediction has parameters that are estimated for each model: an unknown initial state, a zero of
+    /// each of several records, or gain and zero of a nominal spring that was identified from the same readings.
+    pub fn has_nuisances(&self) -> bool {
+        self.initial_state_unknown || self.normalisation.identified || self.is_joined()
+    }
+
     /// Returns the number of readings.
     pub fn rows(&self) -> usize {
         self.reading.len()
@@ -202,6 +214,17 @@ impl Data {
         }
         self.time_s.last().unwrap_or(&0.0) - self.time_s.first().unwrap_or(&0.0)
     }
+}
+
+/// Smallest magnitude of the voltage, relative to the largest, of a record that is never near 0 V.
+const NEVER_NEAR_ZERO: f64 = 0.1;
+
+/// Returns the voltage with the smallest magnitude if all have the same sign and none is near 0 V, else 0, in V.
+fn origin(voltage_v: &[f64]) -> f64 {
+    let nearest = voltage_v.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+    let largest = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let far = nearest.abs() > NEVER_NEAR_ZERO * largest && voltage_v.iter().all(|v| v * nearest > 0.0);
+    if far && nearest.abs() < largest { nearest } else { 0.0 }
 }
 
 /// Returns the first reading over its settled value below which the voltage of the first row is a step at that row, for a

@@ -59,12 +59,22 @@ pub struct Normalisation {
     pub start: Option<Start>,
     /// True if the spring may not have settled when the record begins, even if its first readings show no decay.
     pub unsettled: bool,
+    /// True if the nominal spring was identified from the same readings: its gain and zero are estimated anew for every model, as
+    /// causes that it lacks have biased them.
+    pub identified: bool,
 }
 
 impl Default for Normalisation {
     /// The file's own numbers, and the paper's spring.
     fn default() -> Self {
-        Self { scales: Scales::default(), share: model::Plant::PAPER.share, even: false, start: None, unsettled: false }
+        Self {
+            scales: Scales::default(),
+            share: model::Plant::PAPER.share,
+            even: false,
+            start: None,
+            unsettled: false,
+            identified: false,
+        }
     }
 }
 
@@ -111,7 +121,14 @@ impl Normalisation {
             share: best.share.clamp(0.0, 1.0),
             offset: (best.zero - reading.zero) / scales.reading,
         });
-        Self { share: start.map_or(share, |start| start.share), scales, even, start, unsettled: false }
+        Self {
+            share: start.map_or(share, |start| start.share),
+            scales,
+            even,
+            start,
+            unsettled: false,
+            identified: false,
+        }
     }
 
     /// Chooses the coordinates for several records of one spring: those of the first, but that time begins with each.

@@ -36,6 +36,11 @@ pub enum Forms {
 
 /// Fits structures and evaluates them.
 pub trait Evaluator {
+    /// Returns the simulation as it is given.
+    fn simulation(&self) -> Model {
+        Model::default()
+    }
+
     /// Returns the models from which the search starts in addition to the simulation as it is given.
     fn initial_models(&self) -> Vec<Model> {
         Vec::new()
@@ -97,6 +102,10 @@ pub trait Evaluator {
 }
 
 impl Evaluator for Engine<'_> {
+    fn simulation(&self) -> Model {
+        Engine::simulation(self)
+    }
+
     fn initial_models(&self) -> Vec<Model> {
         let relaxation = &self.base().relaxation;
         initial_models(self.data, relaxation.tau_s, relaxation.share, |cause| self.allows(cause))
@@ -241,9 +250,6 @@ fn extensions(
     let allowed: Vec<(usize, &&dyn Effect)> =
         EFFECTS.iter().enumerate().filter(|(index, effect)| wanted(*index) && engine.allows(effect.cause())).collect();
     for (index, effect) in allowed {
-        if engine.is_over() {
-            return Vec::new();
-        }
         let mut of_effect: Vec<Extension> = Vec::new();
         let forms = match wanted_forms {
             Forms::Common => 0..effect.common_forms(),
@@ -254,15 +260,18 @@ fn extensions(
             let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
             let points = effect.initial_points(form, &scene);
             let every = if scarce { points.len().div_ceil(STARTS_IF_SCARCE) } else { 1 };
-            let starts = points.into_iter().step_by(every.max(1)).map(|point| {
+            let mut starts = Vec::new();
+            for point in points.into_iter().step_by(every.max(1)) {
+                if engine.is_over() {
+                    return Vec::new();
+                }
                 let there = engine.residual_from_rest(&fit.model.with(block, point.clone()));
                 let change: Vec<f64> = from_rest.iter().zip(&there).map(|(a, b)| a - b).collect();
                 engine.budget().spend(PREDICTION * change.len() as u64);
                 let predicted_gain =
                     predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max);
-                Extension { block, point, predicted_gain }
-            });
-            let mut starts: Vec<Extension> = starts.collect();
+                starts.push(Extension { block, point, predicted_gain });
+            }
             starts.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
             // Two starts where the first may be a local maximum.
             starts.truncate(1 + usize::from(starts.len() > 4 && forms.len() == 1));

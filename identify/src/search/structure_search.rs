@@ -184,7 +184,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
 
     /// The simulation as it is given, without any block.
     pub fn root(&mut self) -> Scored {
-        self.evaluated.evaluate(self.evaluator, Model::default())
+        let simulation = self.evaluator.simulation();
+        self.evaluated.evaluate(self.evaluator, simulation)
     }
 
     /// The best of the simulation as it is given and of the evaluator's initial models.

@@ -128,7 +128,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alone = credibility::likely_alone(&findings).filter(|alone| !found.rivals.contains(alone));
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).chain(alone).collect();
-    let would_show = (findings.is_empty() && !unexplained)
+    // What was identified from the same readings is no error that they would have shown.
+    let would_show = (findings.is_empty() && !unexplained && !data.normalisation.identified)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
     let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
@@ -144,7 +145,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect).into_iter().unzip(),
     };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
-    let export = export(engine, found.model(), held);
+    let export = export(engine, &found.model().clone(), held);
 
     let report = Report {
         schema: SCHEMA,

@@ -9,7 +9,7 @@ use crate::record::data::Data;
 use crate::record::scales::Scales;
 use crate::record::signal::Signal;
 use simulation::open_loop;
-use simulation::plant_file::PlantFile;
+use simulation::plant_file::{PlantFile, Reading};
 use simulation::record::{Record, Row};
 use simulation::schedule::{Between, Schedule};
 
@@ -36,9 +36,13 @@ pub struct Export {
 }
 
 /// Exports a fitted model; `held` says that the record's voltage is held between rows.
-pub(crate) fn export(engine: &Engine, model: &Model, held: bool) -> Export {
+pub(crate) fn export(engine: &mut Engine, model: &Model, held: bool) -> Export {
     let (data, base) = (engine.data, engine.base());
-    let file = restored(engine, &model.extend(base, data));
+    let mut file = restored(engine, &model.extend(base, data));
+    if let Some([zero_v, gain]) = engine.reading_map(model) {
+        let nominal = file.reading.unwrap_or_default();
+        file.reading = Some(Reading { gain: gain * nominal.gain, zero: nominal.zero + data.scales().reading * zero_v });
+    }
     let tick_refuses = file.check().err().map(|error| error.to_string());
     let duration_s = data.scales().restored(Dimension::Time, data.duration_s());
     let runs = held && duration_s < LONGEST_TICKED_S && tick_refuses.is_none();

@@ -54,6 +54,13 @@ pub(crate) fn search(
         let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
         best = search.predicting(best, is_larger, held_out);
     }
+    // An identified spring is the best without causes, and causes under which it predicts worse are none.
+    if search.evaluator().data.normalisation.identified {
+        let held_out = error(&search.evaluator().held_out_residual(&best.fit));
+        if best.fit.model.blocks.is_empty() || held_out > error(&baseline.residual) {
+            best = Scored { fit: baseline.clone(), ..search.root() };
+        }
+    }
     let candidate = Candidate { fit: &best.fit, score: best.score };
     if let Some(reason) = adequacy::unidentifiable(search.evaluator(), &candidate, When::AfterSearch) {
         return Err(reason);

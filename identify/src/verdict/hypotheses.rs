@@ -72,7 +72,7 @@ fn same(one: &[&str], other: &[impl AsRef<str>]) -> bool {
 /// each other cause. `None` if a cause is found in the readings alone, or has no form that can be fitted.
 fn exchanged(engine: &mut Engine, best: &Fit, set: &[&str]) -> Option<Fit> {
     let wanted: Vec<usize> = set.iter().map(|cause| index_of(cause)).collect::<Option<_>>()?;
-    let mut model = Model { blocks: best.model.blocks.clone() };
+    let mut model = best.model.clone();
     model.blocks.retain(|(block, _)| wanted.contains(&block.effect));
     let mut fit = None;
     for effect in wanted.into_iter().filter(|&effect| !best.model.has(effect)) {
@@ -93,8 +93,13 @@ fn exchanged(engine: &mut Engine, best: &Fit, set: &[&str]) -> Option<Fit> {
 
 /// Returns a fit as a rival that is `nats` better than the best set.
 fn rival(engine: &mut Engine, fit: &Fit, nats: f64) -> Rival {
-    let covariance = interval::covariance(engine, fit)
-        .map_or_else(Vec::new, |matrix| matrix.row_iter().map(|row| row.iter().copied().collect()).collect());
+    // The coordinates of an identified relaxation, behind those of all blocks, stay as they are in the plan.
+    let fitted = fit.model.blocks.iter().flat_map(|(block, _)| block.coordinates(engine.data));
+    let fitted = fitted.filter(|coordinate| coordinate.fitted).count();
+    let row = |row: &[f64]| row[..fitted].to_vec();
+    let covariance = interval::covariance(engine, fit).map_or_else(Vec::new, |matrix| {
+        matrix.row_iter().take(fitted).map(|of| row(&of.iter().copied().collect::<Vec<f64>>())).collect()
+    });
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     let mut parameters_of = |effect: usize| {
         let parameters = interval::parameters(engine, fit, effect).into_iter().map(|(name, mut it)| {
@@ -131,12 +136,14 @@ fn experiment(diagnosis: &Diagnosis, records: &[Record], reading_unit: &str) -> 
         share: start.share,
         offset: start.offset,
     });
+    // An identified spring as it is under the causes that were found.
+    let relaxation = diagnosis.extended.model.relaxation.clone();
+    let plant = match relaxation.is_empty() {
+        true => diagnosis.base.file().clone(),
+        false => Model { relaxation, ..Model::default() }.extend(&diagnosis.base, data),
+    };
     Experiment {
-        plant: data
-            .normalisation
-            .restored_plant(diagnosis.base.file())
-            .to_toml()
-            .expect("a plant file's tables are TOML"),
+        plant: data.normalisation.restored_plant(&plant).to_toml().expect("a plant file's tables are TOML"),
         lowest_v: voltages().fold(f64::INFINITY, f64::min),
         highest_v: voltages().fold(f64::NEG_INFINITY, f64::max),
         sample_s: data.record_sample_s * scales.second_s,
@@ -168,6 +175,7 @@ fn coordinates(data: &Data, start: Option<FirstSpring>) -> Coordinates {
         even: data.normalisation.even,
         start,
         full_scale_v: data.full_scale_v,
+        origin_v: data.origin_v,
         sample_s: data.record_sample_s,
         uniform: data.uniform,
     }

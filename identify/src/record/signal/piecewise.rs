@@ -1,5 +1,7 @@
 //! A signal of straight pieces with jumps between them, and the blocks that map one such signal to another.
 
+use crate::record::signal::lag::SAME_DURATION;
+
 /// Durations up to this, in s, are rounding errors.
 const ROUNDING_S: f64 = 1e-9;
 
@@ -65,10 +67,20 @@ impl Signal {
         &self.pieces
     }
 
-    /// Returns the number of pieces that are not as long as the one before them.
-    pub fn changes_of_duration(&self) -> usize {
-        let differ = |pair: &&[Piece]| (pair[1].duration_s - pair[0].duration_s).abs() > 1e-9 * pair[1].duration_s;
-        self.pieces.windows(2).filter(differ).count()
+    /// Returns the number of pieces for which a filter has to compute its factors anew: those that are as long as neither of the last two
+    /// different durations. A delay that divides every row into the same two pieces makes none.
+    pub fn new_durations(&self) -> usize {
+        let same = |one: f64, other: f64| (one - other).abs() <= SAME_DURATION * one;
+        let mut known = self.pieces.first().map_or([0.0; 2], |piece| [piece.duration_s; 2]);
+        let mut new = 0;
+        for &Piece { duration_s, .. } in &self.pieces {
+            if same(duration_s, known[0]) {
+                continue;
+            }
+            new += usize::from(!same(duration_s, known[1]));
+            known = [duration_s, known[0]];
+        }
+        new
     }
 
     /// Returns the duration of each piece, in s.
@@ -269,6 +281,20 @@ mod tests {
         let text = "time_s,voltage_v\n0,0\n1,100\n2,100\n3,100\n4,0\n";
         let record = Record::parse("r", text, "stiffness").unwrap();
         Signal::new(&Schedule::from_record(&record, Between::Hold), &[0.0, 1.0, 2.0, 3.0, 4.0], 0.0)
+    }
+
+    #[test]
+    fn a_delay_makes_no_new_durations_and_a_slew_limit_does() {
+        let volts = |row: usize| format!("{row},{}\n", [0, 70, 30, 90, 20][row * row % 5]);
+        let text = format!("time_s,voltage_v\n{}", (0..40).map(volts).collect::<String>());
+        let record = Record::parse("r", &text, "stiffness").unwrap();
+        let time_s: Vec<f64> = (0..40).map(f64::from).collect();
+        let signal = Signal::new(&Schedule::from_record(&record, Between::Hold), &time_s, 0.0);
+        assert!(signal.new_durations() <= 1, "{}", signal.new_durations());
+        let delayed = signal.delayed(0.3);
+        assert!(delayed.len() > 60 && delayed.new_durations() <= 4, "{} {}", delayed.len(), delayed.new_durations());
+        let slewed = signal.slewed(110.0, 110.0);
+        assert!(slewed.new_durations() > 20, "{} {}", slewed.len(), slewed.new_durations());
     }
 
     fn rows(signal: &Signal) -> Vec<f64> {

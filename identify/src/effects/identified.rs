@@ -1,0 +1,107 @@
+//! The relaxation of a nominal spring that was identified from the record that is diagnosed. Causes that a linear model lacks bias it,
+//! so that every set of causes is fitted together with it.
+//!
+//! | coordinates | of |
+//! | --- | --- |
+//! | share, logarithm of the time constant | the first lag |
+//! | logarithm of the time constant, weight | each further lag |
+//! | logarithms of frequency and damping ratio, both weights | each oscillation |
+//!
+//! Zero and gain of the reading are estimated for each model, as the initial state is: the prediction is linear in them.
+
+use crate::effects::effect::Coordinate;
+use crate::plant::relaxation::{Part, Relaxation, contributes};
+use crate::record::data::Data;
+use simulation::plant_file::Mode;
+
+/// Place of the first time constant among the [`coordinates`].
+pub const TIME_CONSTANT: usize = 1;
+/// Largest change of a weight, relative to the static gain.
+const MOST_OF_WEIGHT: f64 = 2.0;
+/// Largest ratio of a frequency, and of a damping ratio, to the identified one.
+const MOST_OF_FREQUENCY: f64 = 1.5;
+const MOST_OF_DAMPING: f64 = 10.0;
+
+/// Returns the coordinates of an identified relaxation with their values.
+pub fn coordinates(relaxation: &Relaxation, data: &Data) -> Vec<(Coordinate, f64)> {
+    let weight = |value: f64| (Coordinate::new(value - MOST_OF_WEIGHT, value + MOST_OF_WEIGHT), value);
+    let tau = |tau_s: f64| {
+        let (shortest, longest) = (0.2 * data.sample_s, 10.0 * data.duration_s());
+        (Coordinate::log(shortest.min(tau_s), longest.max(tau_s)), tau_s.ln())
+    };
+    let near = |value: f64, most: f64| (Coordinate::log(value / most, value * most), value.ln());
+    let mut all = vec![weight(relaxation.share), tau(relaxation.tau_s)];
+    relaxation.parts().for_each(|part| all.extend([tau(part.tau_s), weight(part.part)]));
+    relaxation.oscillations().for_each(|Mode { freq_hz, zeta, weight: of_state, rate_weight }| {
+        all.extend([
+            near(freq_hz, MOST_OF_FREQUENCY),
+            near(zeta, MOST_OF_DAMPING),
+            weight(of_state),
+            weight(rate_weight),
+        ]);
+    });
+    all
+}
+
+/// Returns the relaxation with other values of its [`coordinates`].
+///
+/// # Panics
+/// With fewer values than coordinates.
+pub fn moved(relaxation: &Relaxation, mut values: impl Iterator<Item = f64>) -> Relaxation {
+    let mut next = || values.next().expect("a value for each coordinate");
+    let mut moved = Relaxation { share: next(), ..*relaxation };
+    let factor = next().exp() / relaxation.tau_s;
+    moved.tau_s *= factor;
+    moved.tau_high_s *= factor;
+    for part in moved.further.iter_mut().filter(|part| part.part != 0.0) {
+        *part = Part { tau_s: next().exp(), part: next() };
+    }
+    for mode in moved.modes.iter_mut().filter(|mode| contributes(mode)) {
+        *mode = Mode { freq_hz: next().exp(), zeta: next().exp(), weight: next(), rate_weight: next() };
+    }
+    moved
+}
+
+/// Returns true for a cause that would be another value of what is estimated with an identified relaxation.
+pub fn contains(relaxation: &Relaxation, cause: &str) -> bool {
+    match cause {
+        "gain-error" | "time-constant" | "instantaneous-share" => true,
+        "second-relaxation" => relaxation.parts().next().is_some(),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::Record;
+
+    #[test]
+    fn coordinates_of_a_relaxation_give_it_back() {
+        let rows: String = (0..20).map(|row| format!("{row},{},0\n", 100 * (row / 5 % 2))).collect();
+        let record = Record::parse("r", &format!("time_s,voltage_v,stiffness\n{rows}"), "stiffness").unwrap();
+        let data = Data::new(&record, Input::Hold);
+        let mut relaxation = Relaxation::plain(0.1, 4.0);
+        relaxation.further[0] = Part { part: -0.3, tau_s: 0.7 };
+        relaxation.modes[0] = Mode { freq_hz: 0.2, zeta: 0.1, weight: 0.4, rate_weight: -0.05 };
+        let coordinates = coordinates(&relaxation, &data);
+        assert_eq!(coordinates.len(), 8);
+        assert!(coordinates.iter().all(|(of, value)| of.lowest < *value && *value < of.highest), "{coordinates:?}");
+        let back = moved(&relaxation, coordinates.iter().map(|(_, value)| *value));
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+        assert!(near(back.tau_s, 4.0) && near(back.tau_high_s, 4.0) && back.share == 0.1, "{back:?}");
+        assert!(near(back.further[0].tau_s, 0.7) && back.further[0].part == -0.3, "{back:?}");
+        assert!(near(back.modes[0].freq_hz, 0.2) && near(back.modes[0].zeta, 0.1), "{back:?}");
+        assert_eq!((back.modes[0].weight, back.modes[0].rate_weight), (0.4, -0.05));
+    }
+
+    #[test]
+    fn causes_that_are_estimated_are_no_causes() {
+        let mut relaxation = Relaxation::plain(0.1, 4.0);
+        assert!(contains(&relaxation, "gain-error") && !contains(&relaxation, "second-relaxation"));
+        assert!(!contains(&relaxation, "hysteresis"));
+        relaxation.further[0] = Part { part: 0.3, tau_s: 9.0 };
+        assert!(contains(&relaxation, "second-relaxation"));
+    }
+}

@@ -1,0 +1,86 @@
+//! Diagnoses of a spring that was identified from the same record: what a linear model lacks is named, and what it has is no cause.
+
+use identify::{Diagnosis, Input, Options, Verdict, examine, identify};
+use simulation::record::{Record, Row};
+use simulation::units::Units;
+
+const ROWS: usize = 1200;
+
+/// Independent noise of variance 1: sums of twelve uniform numbers.
+fn normals() -> Vec<f64> {
+    let mut state = 7u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    (0..ROWS).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+}
+
+/// Voltage in levels of 12 to 20 V, each held for 15 to 45 rows: never near 0 V.
+fn levels() -> Vec<f64> {
+    let mut state = 1u32;
+    let mut random = |of: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % of
+    };
+    let mut voltage = Vec::new();
+    while voltage.len() < ROWS {
+        let (level, held) = (12.0 + 8.0 * f64::from(random(1000)) / 999.0, 15 + random(30) as usize);
+        voltage.extend(std::iter::repeat_n(level, held));
+    }
+    voltage.truncate(ROWS);
+    voltage
+}
+
+/// Readings of lags in series, one per second, of a function of the voltage.
+fn record(curve: impl Fn(f64) -> f64, taus_s: &[f64], noise: f64) -> Record {
+    let voltage = levels();
+    let mut lags = vec![curve(voltage[0]); taus_s.len()];
+    let errors = normals();
+    let row = |row: usize| {
+        let measured = Some(lags[lags.len() - 1] + noise * errors[row]);
+        for _ in 0..200 {
+            let mut input = curve(voltage[row]);
+            for (lag, tau_s) in lags.iter_mut().zip(taus_s) {
+                *lag += (input - *lag) * 0.005 / tau_s;
+                input = *lag;
+            }
+        }
+        Row { line: row + 2, time_s: row as f64, voltage_v: voltage[row], measured }
+    };
+    Record { name: "levels".into(), rows: (0..ROWS).map(row).collect() }
+}
+
+fn diagnosed(record: Record) -> (Diagnosis, f64) {
+    let records = [record];
+    let found = identify(&records, Input::Hold, &Units::default()).unwrap();
+    let linear = found.report.held_out_rmse;
+    (examine(&records[0], &Options::default().judging(found).unwrap(), |_| ()).unwrap(), linear)
+}
+
+/// A curve as of a titration. A linear model has the slope in the middle of the range, and bends its poles to the rest; the exported
+/// spring has the secant of the range and the lag of the record.
+#[test]
+fn curve_away_from_zero_is_named_alone() {
+    let curve = |voltage: f64| 7.0 + 3.0 * ((voltage - 16.0) / 2.5).tanh();
+    let (diagnosis, linear) = diagnosed(record(curve, &[6.0], 0.02));
+    let report = &diagnosis.report;
+    let causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert_eq!(causes, ["static-nonlinearity"], "{report:?}");
+    assert!(report.extended.quality.held_out_rmse < 0.5 * linear, "{} {linear}", report.extended.quality.held_out_rmse);
+    let (reading, tau_s) = (diagnosis.plant.reading.unwrap(), diagnosis.plant.relaxation.tau_s[0]);
+    let secant = (curve(20.0) - curve(12.0)) / 8.0;
+    assert!((reading.gain / secant - 1.0).abs() < 0.05, "{reading:?}, expected {secant}");
+    assert!((reading.zero + 12.0 * reading.gain - curve(12.0)).abs() < 0.2, "{reading:?}");
+    assert!((tau_s / 6.0 - 1.0).abs() < 0.1, "{tau_s} s");
+}
+
+/// Nothing is left to name where a linear model describes the record, and the extended simulation is the identified one.
+#[test]
+fn linear_spring_is_consistent_with_what_was_identified() {
+    let (diagnosis, _) = diagnosed(record(|voltage| 2.0 - 0.5 * voltage, &[9.0, 2.0], 0.02));
+    let report = &diagnosis.report;
+    assert_eq!((report.verdict, report.findings.len()), (Verdict::Consistent, 0), "{report:?}");
+    let ratio = report.extended.quality.rmse / report.baseline.rmse;
+    assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+}
