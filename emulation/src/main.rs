@@ -169,9 +169,25 @@ fn main() -> ExitCode {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use xtask::documents;
 
     #[test]
     fn the_command_line_is_defined_without_contradictions() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_documents_name_options_that_exist() {
+        let mut tried = 0;
+        for line in documents::lines().unwrap() {
+            let Some(arguments) = line.arguments("cargo xtask") else { continue };
+            let is_here = |name| Cli::command().find_subcommand(name).is_some();
+            if arguments.first().is_some_and(is_here) {
+                let parsed = Cli::try_parse_from(["cargo xtask"].into_iter().chain(arguments));
+                assert!(parsed.is_ok(), "{line:?}: {}", parsed.err().unwrap());
+                tried += 1;
+            }
+        }
+        assert!(tried > 50, "{tried} command lines");
     }
 }
