@@ -617,6 +617,8 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_is_given():
     [series] = found.series
     assert series.imprecise == 1 and series.drift.by_record.record.endswith("015.csv") and series.drift.strength > 5
     html = page.page(found, "springs", Settings({}, "quick"))
+    assert html.count("<circle") == html.count("<title>record: ") == html.count("\nvalue: ") == 29
+    assert "Fleet of 1 spring<" in html and "31 records of 1 spring, 1 of them" in html and "1 parameter changed" in html
     for part in ("prefers-color-scheme: dark", "max-width: 640px", 'data-name="spring"', "&lt;b&gt;&amp;", "&lt;script&gt;", "hysteresis since"):
         assert part in html, part
     assert "<script" not in html and "<b>" not in html and not re.search(r'(src|href)=|url\(|@import', html)
