@@ -304,6 +304,8 @@ impl Test {
         self.browser.click("simulate-plan")?;
         let args = ["stair", "--input", "schedule.csv", "--controller", "none"];
         same("simulated", &self.control()?, &self.command(&args)?, ROUNDING)?;
+        let legend = self.browser.text("stiffness")?;
+        ensure!(legend.contains("with the report's controller"), "the plot's legend is {legend}");
         self.browser.set("minutes", "-1")?;
         self.browser.click("plan")?;
         self.browser.wait("document.getElementById('plan-error').textContent !== ''", CONTROL)?;
@@ -317,6 +319,8 @@ impl Test {
     fn best_so_far(&mut self) -> Result<()> {
         self.browser.choose("file", &shell::root().join(RECORD))?;
         self.browser.wait("document.getElementById('file-name').textContent.startsWith('sample')", CONTROL)?;
+        // With the paper's spring the search ends about as soon as the click has come.
+        self.browser.set("nominal", "identify")?;
         self.browser.set("effort", "thorough")?;
         self.browser.click("diagnose")?;
         self.browser.wait("document.getElementById('so-far').textContent !== ''", DIAGNOSIS)?;
@@ -332,8 +336,6 @@ impl Test {
 
     /// Cancels twice, before there is an answer.
     fn cancel(&mut self) -> Result<()> {
-        // A diagnosis with the paper's spring would end by itself before the click.
-        self.browser.set("nominal", "identify")?;
         self.browser.click("diagnose")?;
         self.browser.wait("document.body.dataset.record === 'running'", CONTROL)?;
         let begin = Instant::now();
@@ -417,14 +419,16 @@ impl Test {
             ("stiffness", "stair/stiffness.svg"),
         ] {
             let is_page = file.ends_with(".html");
-            for (width, scheme) in [(400, "light"), (400, "dark"), (1200, "light"), (1200, "dark")] {
+            // A phone shows a file of a plot as wide as a page for a desk, and scales that.
+            let narrow = if is_page { 400 } else { 600 };
+            for (width, scheme) in [(narrow, "light"), (narrow, "dark"), (1200, "light"), (1200, "dark")] {
                 self.browser.screen(width, scheme)?;
                 self.browser.open(&self.folder.join(file))?;
                 self.picture(&pictures.join(format!("{name}-{width}-{scheme}.png")), width)?;
                 let sheet = self.browser.value(paper)?;
                 ensure!((sheet == "rgb(255, 255, 255)") == (scheme == "light"), "{name}, {scheme}: {sheet}");
                 let hover = self.browser.value("document.querySelectorAll('svg.plot .hover rect > title').length")?;
-                ensure!(hover.as_u64() >= Some(20), "{name}: values on hover at {hover} places");
+                ensure!(hover.as_u64() >= Some(15), "{name}: values on hover at {hover} places");
                 if !is_page {
                     continue;
                 }
