@@ -1,4 +1,4 @@
-//! `cargo xtask clients`: the clients of the link in C++ and Python command the emulated firmware.
+//! `cargo xtask clients`: the clients of the link in C++ and Python and the full screen of `vsj watch` command the emulated firmware.
 //!
 //! In: the image and the virtual environment of `cargo xtask python`, in which the package is installed. Out: one line on stdout for
 //! each client.
@@ -13,6 +13,7 @@ use xtask::build::{self, Board, Opt};
 use xtask::{setup, shell};
 
 use crate::qemu::emulator;
+use crate::watch;
 
 /// Longest wait for the emulator's socket.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -26,8 +27,10 @@ pub(crate) fn run() -> Result<()> {
     let cmake = setup::cmake()?;
     let elf = build::image(Board::Mps2, Opt::S)?;
     let target = shell::target_directory()?;
+    let vsj = build::vsj()?;
     cpp(&cmake, &elf, &target)?;
-    python(&elf, &target)
+    python(&vsj, &elf, &target)?;
+    watch::run(&vsj, &elf).context("vsj watch --emulated")
 }
 
 /// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board.
@@ -42,18 +45,23 @@ fn cpp(cmake: &Path, elf: &Path, target: &Path) -> Result<()> {
         let mut command = shell::command(built.join("board"));
         command.arg(port).arg(folder.path().join("record.csv"));
         command
+    })?;
+    // The manual's first step.
+    on_board(elf, "cpp", |port| {
+        let mut command = shell::command(built.join("step"));
+        command.arg(port);
+        command
     })
 }
 
 /// Runs the tests of the Python package that need a board.
-fn python(elf: &Path, target: &Path) -> Result<()> {
+fn python(vsj: &Path, elf: &Path, target: &Path) -> Result<()> {
     let python = target.join("python-venv/bin/python");
     ensure!(python.exists(), "{} is missing: run cargo xtask python", python.display());
-    let vsj = build::vsj()?;
     on_board(elf, "python", |port| {
         let mut command = shell::command(&python);
         command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests/test_link.py"]);
-        command.env("VSJ", &vsj).env("VSJ_BOARD", port);
+        command.env("VSJ", vsj).env("VSJ_BOARD", port);
         command
     })
 }

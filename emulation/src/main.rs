@@ -5,7 +5,7 @@
 //!
 //! - [`binary`] reads an image's machine code: panics, floats, stack, size.
 //! - [`qemu`] runs an image under QEMU and compares the run with the same code on the host: [`emulate`], [`rivals`],
-//!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`clients`], [`story`].
+//!   [`blocks`], [`isolation`], [`drill`], [`talk`], [`clients`], [`watch`], [`story`].
 //! - [`boot`] runs the image that is flashed on models of the chip's registers.
 //! - [`capi`] builds the C library's example and compares its run on this machine and under QEMU with the same in Rust.
 //! - [`soak`] runs random ticks of the control on the host and checks every invariant in each.
@@ -26,6 +26,7 @@ mod soak;
 mod story;
 mod talk;
 mod variant;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -80,8 +81,9 @@ Examples:
     /// Let the clients in C++ and Python command the emulated firmware
     ///
     /// Compiles the header clients/cpp/vsj_link.hpp with CMake, checks every frame of the protocol, and lets its client and that of
-    /// the Python package, which `cargo xtask python` has installed, arm, set, watch, record and disarm a board each. Installs
-    /// CMake and a C++ compiler with apt-get unless they are there. A part of `test`.
+    /// the Python package, which `cargo xtask python` has installed, arm, set, watch, record and disarm a board each. Then does the
+    /// same by the keys of `vsj watch --emulated` in a pseudo-terminal. Installs CMake and a C++ compiler with apt-get unless they
+    /// are there. A part of `test`.
     Clients,
     /// End-to-end demonstration: run, diagnose, extend, run again
     ///
@@ -169,9 +171,25 @@ fn main() -> ExitCode {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use xtask::documents;
 
     #[test]
     fn the_command_line_is_defined_without_contradictions() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_documents_name_options_that_exist() {
+        let mut tried = 0;
+        for line in documents::lines().unwrap() {
+            let Some(arguments) = line.arguments("cargo xtask") else { continue };
+            let is_here = |name| Cli::command().find_subcommand(name).is_some();
+            if arguments.first().is_some_and(is_here) {
+                let parsed = Cli::try_parse_from(["cargo xtask"].into_iter().chain(arguments));
+                assert!(parsed.is_ok(), "{line:?}: {}", parsed.err().unwrap());
+                tried += 1;
+            }
+        }
+        assert!(tried > 50, "{tried} command lines");
     }
 }

@@ -139,10 +139,12 @@ export class ControlPanel {
     byId("control-error").textContent = "";
     const answer = JSON.parse(run.json);
     byId("stair-json").textContent = run.json;
+    // Without a controller the answer has the report's for comparison; its voltage is not the one that is shown.
+    const controlled = request.controller === "none" ? "with the report's controller" : "with controller";
     const series = [
       { name: "target", colour: COLOUR.target, curve: run.target, dashed: true },
       { name: "without controller", colour: COLOUR.before, curve: run.without },
-      { name: "with controller", colour: COLOUR.after, curve: run.with },
+      { name: controlled, colour: COLOUR.after, curve: run.with },
     ];
     const hidden = this.#hidden;
     if (hidden) series.push({ name: "true, with the effect", colour: COLOUR.reading, curve: hidden.stiffness });

@@ -1,5 +1,8 @@
 """The tick compared with the command's, bit for bit."""
 
+import threading
+import time
+
 import numpy as np
 import pandas
 import pytest
@@ -70,6 +73,16 @@ def test_simulate_is_the_spring_of_the_controller():
     run = vsj.Controller(controller="none", dac_bits=16).run(volts)
     stiffness = vsj.simulate("paper", run.time_s, run.applied_v)
     np.testing.assert_allclose(stiffness, run.stiffness_v, atol=1e-6)
+
+
+def test_other_threads_run_during_ticks():
+    controller, targets = vsj.Controller(), np.full(5_000_000, 300.0)
+    turns, thread = 0, threading.Thread(target=controller.run, args=(targets,))
+    thread.start()
+    while thread.is_alive():
+        turns += 1
+        time.sleep(0.001)
+    assert turns > 20
 
 
 def test_settings_and_inputs_out_of_range_are_bad_input(command):

@@ -1,6 +1,7 @@
 """The fleet: every record has one row, whatever dies on the way, and the page says what is in the rows."""
 
 import datetime
+import gc
 import json
 import os
 import re
@@ -11,12 +12,14 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 import types
 
 import distributed
 import numpy as np
 import pandas
 import psutil
+import pyarrow
 import pytest
 
 import vsj
@@ -395,6 +398,43 @@ def no_options():
     return dict.fromkeys(("time", "voltage", "reading", "column", "columns", "separator", "decimal", "input")) | {"sort": False}
 
 
+def test_a_bounded_number_of_batches_is_in_progress(folder, tmp_path, engine, monkeypatch):
+    address, table = records.listed(folder)
+    table, submitted, ended, most = fleet._with_plants(table, "paper"), [], [], 0
+    (tmp_path / "out").mkdir()
+    with distributed.Client(engine) as client:
+        submit = client.submit
+
+        def counted(*arguments, **options):
+            nonlocal most
+            submitted.append(arguments)
+            most = max(most, len(submitted) - len(ended))
+            return submit(*arguments, **options)
+
+        monkeypatch.setattr(client, "submit", counted)
+        run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, str(tmp_path / "out"), 1, ended.append)
+    assert len(ended) == SPRINGS * RECORDS and most == run._AHEAD
+
+
+def test_the_memory_for_each_record_is_at_most_that_of_the_estimate(tmp_path):
+    """Names, keys and states of records that are all finished, which is the most that the program ever has."""
+    count = 50_000
+    names = [f"spring-{index % 500:03}/2026-01-01T{index:06}.csv" for index in range(count)]
+    (tmp_path / "list.csv").write_text("record\n" + "\n".join(names) + "\n")
+    (tmp_path / "parts").mkdir()
+    empty = dict.fromkeys(store.SCHEMA.names)
+    rows = [empty | dict(spring=name[:10], record=name, key=f"{index:032x}", status="diagnosed") for index, name in enumerate(names)]
+    store.write_part(str(tmp_path), rows)
+    del rows
+    gc.collect()
+    before = pyarrow.total_allocated_bytes()
+    tracemalloc.start()
+    kept = records.listed(tmp_path / "list.csv"), run.Outcome(count), run._finished(str(tmp_path))
+    taken = tracemalloc.get_traced_memory()[0] + pyarrow.total_allocated_bytes() - before
+    tracemalloc.stop()
+    assert len(kept[2]) == count and 0.5 * cost._CLIENT_BYTES < taken / count < cost._CLIENT_BYTES, taken / count
+
+
 def test_a_worker_with_another_version_is_refused(tmp_path):
     settings = Settings(no_options(), "quick", version="0.0.0")
     with pytest.raises(RuntimeError, match="expected 0.0.0"):
@@ -577,6 +617,8 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_is_given():
     [series] = found.series
     assert series.imprecise == 1 and series.drift.by_record.record.endswith("015.csv") and series.drift.strength > 5
     html = page.page(found, "springs", Settings({}, "quick"))
+    assert html.count("<circle") == html.count("<title>record: ") == html.count("\nvalue: ") == 29
+    assert "Fleet of 1 spring<" in html and "31 records of 1 spring, 1 of them" in html and "1 parameter changed" in html
     for part in ("prefers-color-scheme: dark", "max-width: 640px", 'data-name="spring"', "&lt;b&gt;&amp;", "&lt;script&gt;", "hysteresis since"):
         assert part in html, part
     assert "<script" not in html and "<b>" not in html and not re.search(r'(src|href)=|url\(|@import', html)

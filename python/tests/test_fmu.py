@@ -1,6 +1,7 @@
 """Units of `vsj export fmu`, loaded by FMPy: valid, and equal to the tick to the bit."""
 
 import json
+import re
 import warnings
 import zipfile
 from pathlib import Path
@@ -119,6 +120,34 @@ def test_a_unit_is_valid_and_equal_to_the_tick_to_the_bit(export, case, unit, fm
         assert instance.get("stiffness_v") == estimate[-1]
 
 
+@pytest.mark.parametrize("unit, fmi", UNITS)
+@pytest.mark.parametrize("case", CASES)
+def test_variables_have_units_ranges_and_the_start_values_of_the_export(export, case, unit, fmi):
+    description = fmpy.read_model_description(str(export(case) / f"vsj_{unit}.fmi{fmi}.fmu"))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    for name, variable in variables.items():
+        assert variable.description, name
+        ending = name.rstrip("0123456789[]")
+        unit_of = "V/s" if ending.endswith("_v_per_s") else {"v": "V", "s": "s", "hz": "Hz"}.get(ending.rsplit("_", 1)[-1])
+        assert unit_of is None or variable.unit == unit_of, f"{name} in {variable.unit}"
+        if variable.causality in ("parameter", "input"):
+            start = float(variable.start)
+            assert variable.min is None or float(variable.min) <= start, name
+            assert variable.max is None or start <= float(variable.max), name
+    assert {unit.name for unit in description.unitDefinitions} >= {"V", "s", "Hz"}
+    if unit == "spring":
+        return
+    _, options, _ = CASES[case]
+    start = lambda name: float(variables[name].start)
+    names = ["none", "paper", "fast", "robust"]
+    assert variables["controller"].start == str(1 + names.index(options["controller"]))
+    assert start("limit_v") == options.get("limit_v", 700.0) and start("rate_hz") == 1000.0
+    known = options.get("known", {})
+    assert [start("known_tau"), start("known_share")] == pytest.approx([known.get(key, 5) / 100 for key in ("tau", "share")])
+    if case == "paper":
+        assert start("model.relaxation.tau_s[1]") == 5.5 and start("model.relaxation.share") == pytest.approx(1 / 11)
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_an_importer_simulates_a_unit_with_a_signal(export, fmi):
     """A step of the importer may be several ticks; row k + 1 has the outputs of the step from row k on."""
@@ -130,6 +159,17 @@ def test_an_importer_simulates_a_unit_with_a_signal(export, fmi):
     expected = vsj.Controller("paper").run(np.repeat(targets[:60], 10))
     np.testing.assert_array_equal(result["stiffness_v"][1:], expected.stiffness_v[9::10])
     np.testing.assert_array_equal(result["applied_v"][1:], expected.applied_v[9::10])
+
+
+def test_the_example_of_the_manual_runs(command, tmp_path, monkeypatch):
+    """The spring of the example is half as fast as its controller knows."""
+    [example] = re.findall(r"```python\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    command("export", "fmu", "--out", tmp_path / "out/fmu")
+    names = {}
+    exec(example, names)
+    last = names["result"][-1]
+    assert last["time"] == 10 and abs(last["estimate_v"] - 300) < 10 < last["estimate_v"] - last["stiffness_v"]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

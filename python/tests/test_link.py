@@ -1,10 +1,13 @@
 """The client of the link: its errors without a board, and the emulated board of `cargo xtask clients`."""
 
 import os
+import re
 import time
 
 import pytest
 import vsj
+
+from conftest import ROOT
 
 
 @pytest.fixture
@@ -41,6 +44,25 @@ def test_the_link_arms_sets_watches_and_disarms(board):
             link.set(10)
     with pytest.raises(vsj.LinkError, match="the link is closed"):
         link.status()
+
+
+def test_the_board_names_the_revision_of_the_command(board, command):
+    version, revision = re.fullmatch(r"vsj (\S+) \((\w+)\)\n", command("--version")).groups()
+    with vsj.Link(board, timeout=5) as link:
+        named = "" if revision == "unknown" else f" ({revision[:8]})"
+        assert link.status()["firmware"] == version + named
+
+
+def test_the_example_of_the_manual_runs(board, capsys):
+    """The last line is for a board with a sensor; without one it is refused."""
+    [example] = re.findall(r"```python\n(.*?)```", (ROOT / "docs/clients.md").read_text(), re.DOTALL)
+    session, diagnosis = example.replace("/dev/ttyACM0", board).split("\n\nprint(")
+    names = {}
+    exec(session, names)
+    assert len(capsys.readouterr().out.splitlines()) > 100
+    assert names["record"].time_s.iloc[-1] == pytest.approx(15, abs=0.1)
+    with pytest.raises(vsj.BadInput, match="the controller's own estimate"):
+        exec(f"print({diagnosis}", names)
 
 
 def test_a_schedule_is_recorded_from_its_first_row_on(board):

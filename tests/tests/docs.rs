@@ -116,6 +116,32 @@ fn the_pins_in_the_manual_are_those_of_the_firmware() {
     assert!(manual.contains("https://probe.rs/docs/getting-started/probe-setup/"));
 }
 
+/// The program is compiled and run on the emulated board by `cargo xtask clients`.
+#[test]
+fn the_first_step_in_c_plus_plus_is_the_program_that_is_tested() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("a file");
+    let (manual, program) = (read("docs/clients.md"), read("clients/cpp/test/step.cpp"));
+    let step = manual.split("```cpp\n").nth(1).and_then(|rest| rest.split("```").next()).expect("the first step");
+    // The program takes the port as an argument.
+    let program = program.replace("argc > 1 ? argv[1] : ", "").replace("\n    ", "\n");
+    assert!(step.lines().count() >= 6 && program.contains(step), "{step}");
+}
+
+/// In a block of the book there is room for 78 characters.
+#[test]
+fn the_wiring_is_drawn_straight_and_fits_the_page() {
+    let manual = fs::read_to_string(root().join("docs/bring-up.md")).expect("a page");
+    let drawing = manual.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("the wiring");
+    let rows: Vec<Vec<char>> = drawing.lines().map(|line| line.chars().collect()).collect();
+    assert!(rows.iter().all(|row| row.len() <= 78), "{drawing}");
+    let [upper, lower] = ['┌', '└'].map(|corner| rows.iter().position(|row| row.contains(&corner)).expect("boxes"));
+    let sides = rows[upper].iter().enumerate().filter(|(_, letter)| "┌┐".contains(**letter)).map(|(column, _)| column);
+    for column in sides {
+        let is_side = |row: &Vec<char>| row.get(column).is_some_and(|letter| "│├┤►◄".contains(*letter));
+        assert!(rows[upper + 1..lower].iter().all(is_side), "column {column}:\n{drawing}");
+    }
+}
+
 #[test]
 fn the_readme_quotes_what_diagnose_prints_on_the_sample_record() {
     let readme = fs::read_to_string(root().join("README.md")).expect("the README");

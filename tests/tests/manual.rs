@@ -1,95 +1,118 @@
-//! The manual: its first page is run, and every command line that it quotes is one that `vsj` understands.
+//! The manual: the commands of its pages are run, and every command line that it quotes is one that `vsj` understands. The pages about
+//! a board are run by the tests of `vsj link`, those of other programs by the tests of these.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use end_to_end::vsj::{run, text, vsj};
+use simulation::record::{MEASURED, Record};
+use xtask::documents::{self, Line};
+
+/// Its examples, refusals among them, are run by `data_files.rs`.
+const HAS_A_TEST: &str = "docs/data-files.md";
+/// Names of choices in sentences, and one of them.
+const CHOICES: [(&str, &str); 3] = [("SHELL", "bash"), ("MODEL", "zener"), ("KEY=PERCENT", "tau=5")];
+const SAMPLE: &str = "data/sample_hysteresis.csv";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the repository")
 }
 
-fn page(path: &str) -> String {
-    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-/// The lines of a page's blocks of shell commands, without comments.
-fn shell_lines(page: &str) -> Vec<String> {
-    let mut in_shell = false;
-    let mut lines = Vec::new();
-    for line in page.lines() {
-        if let Some(language) = line.trim_start().strip_prefix("```") {
-            in_shell = language == "sh";
-        } else if in_shell {
-            let command = line.split(" #").next().unwrap_or_default().trim();
-            lines.push(command.to_owned());
+/// The command lines of `vsj` in blocks, by page.
+fn pages() -> BTreeMap<String, Vec<Line>> {
+    let mut pages: BTreeMap<String, Vec<Line>> = BTreeMap::new();
+    for line in documents::lines().expect("the documents") {
+        if line.is_whole && line.of_vsj().is_some() {
+            pages.entry(line.page.clone()).or_default().push(line);
         }
     }
-    lines.retain(|line| !line.is_empty());
-    lines
-}
-
-/// The arguments of `vsj` in a command line, up to a pipe or a redirection; `None` for another program.
-fn arguments(line: &str) -> Option<Vec<&str>> {
-    let rest = ["vsj", "cargo run --release"].iter().find_map(|program| line.strip_prefix(program))?;
-    let rest = rest.strip_prefix(" --").filter(|rest| rest.starts_with(' ')).unwrap_or(rest);
-    if !rest.is_empty() && !rest.starts_with(' ') {
-        return None;
-    }
-    Some(rest.split_whitespace().take_while(|word| !["|", ">", "&&", "&", "<"].contains(word)).collect())
+    pages
 }
 
 #[test]
-fn the_commands_of_the_first_page_run_in_their_order() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::create_dir(folder.path().join("data")).expect("a folder");
-    let sample = "data/sample_hysteresis.csv";
-    fs::copy(root().join(sample), folder.path().join(sample)).expect("the sample record");
+fn the_commands_of_every_page_without_a_board_run_in_their_order() {
     let mut ran = 0;
-    for line in shell_lines(&page("docs/getting-started.md")) {
-        let Some(arguments) = arguments(&line) else {
-            assert!(line.starts_with("cargo xtask "), "not run by this test: {line}");
+    for (page, lines) in pages() {
+        if page == HAS_A_TEST || lines.iter().any(Line::needs_board) {
             continue;
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        files(folder.path());
+        for line in &lines {
+            let arguments = line.of_vsj().expect("a command of vsj");
+            // The full screen has tests of its own, in a pseudo-terminal.
+            if arguments.first() == Some(&"watch") {
+                continue;
+            }
+            if let ["diagnose" | "identify", record, ..] = arguments[..] {
+                let record = folder.path().join(record);
+                if !record.exists() {
+                    fs::create_dir_all(record.parent().expect("a folder")).expect("a folder");
+                    fs::copy(root().join(SAMPLE), record).expect("the sample record");
+                }
+            }
+            let output = run(folder.path(), &arguments);
+            assert!(output.status.success(), "{page}: {}\n{}", line.text, text(&output.stderr));
+            if let Some((_, file)) = line.text.split_once(" > ") {
+                fs::write(folder.path().join(file), output.stdout).expect("a file");
+            }
+            ran += 1;
+        }
+        let expected: &[&str] = match page.as_str() {
+            "docs/getting-started.md" => {
+                &["out/stair/stair.csv", "out/diagnosis/report.html", "out/nominal/plant.toml", "out/plan/schedule.csv"]
+            }
+            "docs/export.md" => &["out/fmu/vsj_both.fmi3.fmu", "out/c/vsj_settings.h"],
+            _ => &[],
         };
-        // The full screen has tests of its own, in a pseudo-terminal.
-        if arguments.first() == Some(&"watch") {
-            continue;
+        for file in expected {
+            assert!(folder.path().join(file).exists(), "{page}: {file}");
         }
-        let output = run(folder.path(), &arguments);
-        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
-        if let Some((_, file)) = line.split_once(" > ") {
-            fs::write(folder.path().join(file), output.stdout).expect("a file");
-        }
-        ran += 1;
     }
-    assert!(ran >= 8, "{ran} commands");
-    for file in ["out/stair/stair.csv", "out/diagnosis/report.html", "out/nominal/plant.toml", "out/plan/schedule.csv"]
-    {
-        assert!(folder.path().join(file).exists(), "{file}");
+    assert!(ran >= 20, "{ran} commands");
+}
+
+/// What the pages start from: the repository's records and plant file, and the README's record of a reader's own, in kV and mm with
+/// semicolons and decimal commas.
+fn files(folder: &Path) {
+    for path in ["data", "docs"] {
+        fs::create_dir(folder.join(path)).expect("a folder");
     }
+    for path in [SAMPLE, "data/table3_stair.csv", "docs/plant.toml"] {
+        fs::copy(root().join(path), folder.join(path)).expect("a file of the repository");
+    }
+    let rows = Record::open(&root().join(SAMPLE), MEASURED).expect("the sample record").rows;
+    let table = rows.iter().fold(String::from("t_ms;u_kV;x_mm\n"), |table, row| {
+        let reading = row.measured.expect("a reading") / 1e3;
+        table + &format!("{};{};{reading}\n", row.time_s * 1e3, row.voltage_v / 1e3).replace('.', ",")
+    });
+    fs::write(folder.join("hv.csv"), table).expect("a file");
 }
 
 /// `--help` at the end of a line ends the parsing after the options before it were understood.
 #[test]
 fn every_command_line_in_the_manual_is_understood() {
-    let docs = fs::read_dir(root().join("docs")).expect("docs");
-    let names =
-        docs.map(|entry| entry.expect("an entry").path()).filter(|path| path.extension().is_some_and(|it| it == "md"));
     let mut tried = 0;
-    for path in names.chain([root().join("README.md")]) {
-        for line in shell_lines(&fs::read_to_string(&path).expect("a page")) {
-            let Some(arguments) = arguments(&line) else { continue };
-            let output = vsj().args(&arguments).arg("--help").output().expect("vsj starts");
-            assert!(output.status.success(), "{}: {line}\n{}", path.display(), text(&output.stderr));
-            tried += 1;
+    for line in documents::lines().expect("the documents") {
+        let Some(mut arguments) = line.of_vsj() else { continue };
+        for (choice, one) in CHOICES {
+            arguments.iter_mut().filter(|word| **word == choice).for_each(|word| *word = one);
         }
+        let output = vsj().args(&arguments).arg("--help").output().expect("vsj starts");
+        let error = text(&output.stderr);
+        // A sentence may name an option without a value.
+        let is_named = ["a value is required", "invalid value '--help'"].iter().any(|said| error.contains(said));
+        let is_understood = output.status.success() || !line.is_whole && is_named;
+        assert!(is_understood, "{line:?}\n{error}");
+        tried += 1;
     }
-    assert!(tried > 40, "{tried} command lines");
+    assert!(tried > 150, "{tried} command lines");
 }
 
 #[test]
 fn the_contents_list_every_page() {
-    let contents = page("docs/SUMMARY.md");
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the contents");
     for entry in fs::read_dir(root().join("docs")).expect("docs") {
         let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
         let is_listed = name == "SUMMARY.md" || !name.ends_with(".md") || contents.contains(&format!("]({name})"));

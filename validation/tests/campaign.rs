@@ -11,6 +11,7 @@ use validation::campaign::score::Outcome;
 use validation::campaign::summary::Summary;
 use validation::campaign::{answer_table, detectable, isolable, sensitivity, shared, steps, tables};
 use validation::ground_truth::Cause;
+use xtask::documents;
 
 /// First seed; that of the campaign is 1.
 const FIRST: u64 = 20_261_121;
@@ -172,4 +173,38 @@ fn exported_records_are_files_with_their_true_values() {
         assert_eq!(record.unwrap().rows, job.recipe.draw(job.seed).record().rows);
         assert!(file("json").exists());
     }
+}
+
+/// The lines that only write records are run, with one record of each cause; `--help` ends the parsing of the others.
+#[test]
+fn the_documents_name_campaigns_that_exist() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut tried, mut written) = (0, 0);
+    for line in documents::lines().unwrap() {
+        let programs = [
+            ("cargo campaign", env!("CARGO_BIN_EXE_campaign"), None),
+            ("cargo thresholds", env!("CARGO_BIN_EXE_campaign"), Some("thresholds")),
+            ("cargo feedback", env!("CARGO_BIN_EXE_feedback"), None),
+        ];
+        for (name, program, first) in programs {
+            let Some(arguments) = line.arguments(name) else { continue };
+            let mut command = std::process::Command::new(program);
+            command.current_dir(folder.path()).args(first).args(&arguments);
+            let writes = line.is_whole && ["--write", "--export"].iter().any(|option| arguments.contains(option));
+            if arguments.contains(&"--export") && writes {
+                command.args(["--records", "1"]);
+            } else if !writes {
+                command.arg("--help");
+            }
+            let output = command.output().unwrap();
+            let error = String::from_utf8_lossy(&output.stderr);
+            // A sentence may name an option without a value.
+            let is_understood = output.status.success() || !line.is_whole && error.contains("a value is required");
+            assert!(is_understood, "{line:?}: {error}");
+            tried += 1;
+            written += usize::from(writes);
+        }
+    }
+    assert!(tried > 40 && written >= 2, "{tried} command lines, {written} that write records");
+    assert!(folder.path().join("out/hidden/hysteresis-5.csv").exists());
 }

@@ -1,4 +1,4 @@
-"""Times `python -m vsj.fleet` with two workers and with one, and prints the ratio, with the machine's load before each run.
+"""Times `python -m vsj.fleet` with two workers and with one, and prints the ratio, with what else the machine did during each run.
 
 Needs an interpreter with `./python[fleet]`, such as target/python-venv/bin/python after `cargo xtask python`. The time is that of the
 whole command, the start of the workers included.
@@ -8,12 +8,14 @@ import datetime
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
 import time
 
 import numpy as np
+import psutil
 import vsj
 from vsj import _vsj
 
@@ -37,15 +39,22 @@ def write(folder):
             np.savetxt(folder / f"spring-{spring}/{date}.csv", table, "%.9g", ",", header="time_s,voltage_v,stiffness", comments="")
 
 
+def busy():
+    """CPU time of this machine and of the programs that this one has run, in s."""
+    machine, own = psutil.cpu_times(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    return sum(machine[:3]), own.ru_utime + own.ru_stime
+
+
 def seconds(folder, out, workers):
-    """Time of the command, in s."""
+    """Time of the command in s, and the part of the machine's CPU time that other programs took meanwhile."""
     command = [sys.executable, "-m", "vsj.fleet", folder, "--out", out, "--workers", str(workers), "--batch", "4", "--json"]
-    start = time.monotonic()
+    start, before = time.monotonic(), busy()
     answer = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
     taken = time.monotonic() - start
+    all_s, own_s = (after - earlier for after, earlier in zip(busy(), before))
     if answer["finished_now"] != SPRINGS * RECORDS:
         sys.exit(f"fleet.py: {answer['finished_now']} of {SPRINGS * RECORDS} records are new; expected all")
-    return taken
+    return taken, max(0.0, all_s - own_s) / (taken * os.cpu_count())
 
 
 def main():
@@ -55,10 +64,9 @@ def main():
         best = {1: np.inf, 2: np.inf}
         for turn in range(ROUNDS):
             for workers in best:
-                load = os.getloadavg()[0]
-                taken = seconds(scratch / "springs", scratch / f"out-{turn}-{workers}", workers)
+                taken, others = seconds(scratch / "springs", scratch / f"out-{turn}-{workers}", workers)
                 best[workers] = min(best[workers], taken)
-                print(f"{workers} workers: {taken:.1f} s, load before {load:.1f}", flush=True)
+                print(f"{workers} workers: {taken:.1f} s, other programs took {100 * others:.0f} % of the CPU time", flush=True)
         print(f"vsj {vsj.__version__}, {SPRINGS * RECORDS} records of {ROWS} rows: {best[1] / best[2]:.2f} times as fast with 2 workers")
 
 

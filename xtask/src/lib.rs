@@ -4,6 +4,7 @@
 //! them, installed tools. No crate of the product is a dependency, so that `cargo xtask` compiles in seconds.
 
 pub mod build;
+pub mod documents;
 pub mod files;
 pub mod python;
 mod seal;

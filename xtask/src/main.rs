@@ -297,11 +297,64 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use clap::error::ErrorKind;
+    use xtask::{documents, shell};
+
     use super::*;
 
     #[test]
     fn the_command_line_is_defined_without_contradictions() {
         Cli::command().debug_assert();
+    }
+
+    /// The options of the emulation's commands are checked by a test of that package.
+    #[test]
+    fn the_documents_name_commands_that_exist() {
+        let lines = documents::lines().unwrap();
+        let mut tried = 0;
+        for line in &lines {
+            let Some(arguments) = line.arguments("cargo xtask").filter(|arguments| !arguments.is_empty()) else {
+                continue;
+            };
+            if let Err(error) = Cli::try_parse_from(["cargo xtask"].into_iter().chain(arguments)) {
+                assert_eq!(error.kind(), ErrorKind::DisplayHelp, "{line:?}: {error}");
+            }
+            tried += 1;
+        }
+        assert!(tried > 80, "{tried} command lines");
+    }
+
+    #[test]
+    fn the_documents_name_packages_tests_and_examples_that_exist() {
+        let metadata =
+            shell::json(shell::cargo().args(["metadata", "--no-deps", "--offline", "--format-version", "1"]));
+        let packages = metadata.unwrap()["packages"].take();
+        let mut tried = 0;
+        for line in documents::lines().unwrap() {
+            let mut words = line.text.split_whitespace().skip_while(|word| *word != "cargo").skip(1);
+            let is_of_package = ["run", "test", "build", "rustc", "publish", "package"];
+            if !words.next().is_some_and(|command| is_of_package.contains(&command)) {
+                continue;
+            }
+            let options: Vec<&str> = words.take_while(|word| *word != "--").collect();
+            for pair in options.windows(2) {
+                let [option, name] = pair else { continue };
+                let is_there = match *option {
+                    "-p" => packages.as_array().unwrap().iter().any(|package| package["name"] == *name),
+                    "--test" | "--example" => packages.as_array().unwrap().iter().any(|package| {
+                        let is_named = |target: &serde_json::Value| {
+                            target["name"] == *name && target["kind"][0] == option.trim_start_matches('-')
+                        };
+                        package["targets"].as_array().unwrap().iter().any(is_named)
+                            && options.windows(2).any(|of| of[0] == "-p" && package["name"] == of[1])
+                    }),
+                    _ => continue,
+                };
+                assert!(is_there, "{option} {name} does not exist: {line:?}");
+                tried += 1;
+            }
+        }
+        assert!(tried > 15, "{tried} names");
     }
 
     #[test]

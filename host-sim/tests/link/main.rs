@@ -5,6 +5,7 @@ mod capture;
 mod command;
 mod containers;
 mod damage;
+mod manual;
 mod mcu;
 mod model;
 #[cfg(target_os = "linux")]

@@ -18,6 +18,7 @@ svg.chart .smooth { stroke: var(--after); stroke-width: 2; }
 @media (max-width: 560px) { svg.chart { font-size: 24px; } }
 """
 
+_COLUMNS = ["record", "value", "low", "high", "EWMA", "limit"]
 _WIDTH, _LEFT, _RIGHT = 800, 110, 785
 _TOP, _MIDDLE, _LOWER, _BOTTOM = 15, 215, 240, 330
 _HEIGHT = 375
@@ -63,10 +64,19 @@ def drawn(series):
     parts += [_path([(_LEFT, below(0)), (_RIGHT, below(0))], ""), _text(_LEFT - 8, below(0) + 5, "EWMA", "end")]
     mean = drift.before
     parts.append(_path([(_LEFT, y(mean)), (_RIGHT, y(mean))], "mean"))
-    for each, value, one, other, is_off in zip(at, values, low, high, outside):
+    decimals = digits(drift.scatter)
+    number = lambda it, places: "" if np.isnan(it) else f"{it:.{places}f}"
+    rows = [
+        [str(moment), *(number(it, decimals) for it in quantity), *(number(it, 2) for it in ewma)]
+        for moment, quantity, ewma in zip(moments, zip(values, low, high), zip(z, limit))
+    ]
+    for each, value, one, other, is_off, row in zip(at, values, low, high, outside, rows):
         name = "off" if is_off else "interval"
         parts.append(_path([(x(each), y(max(one, bottom))), (x(each), y(min(other, top)))], name))
-        parts.append(Markup('<circle class="{}" cx="{:.1f}" cy="{:.1f}" r="3.5"/>').format("off" if is_off else "value", x(each), y(value)))
+        # The text that browsers show on hover.
+        shown_values = "\n".join(f"{column}: {cell}" for column, cell in zip(_COLUMNS, row) if cell)
+        circle = Markup('<circle class="{}" cx="{:.1f}" cy="{:.1f}" r="3.5"><title>{}</title></circle>')
+        parts.append(circle.format("off" if is_off else "value", x(each), y(value), shown_values))
     steps = np.diff(at)
     breaks = np.flatnonzero(steps > _GAP * np.median(steps)) + 1 if len(steps) else []
     for piece in np.split(np.arange(len(at)), breaks):
@@ -78,18 +88,15 @@ def drawn(series):
     svg = Markup('<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}">{}</svg>').format(
         _WIDTH, _HEIGHT, label, Markup("").join(parts)
     )
-    decimals = digits(drift.scatter)
-    number = lambda it, places: "" if np.isnan(it) else f"{it:.{places}f}"
-    rows = [
-        [str(moment), *(number(it, decimals) for it in quantity), *(number(it, 2) for it in ewma)]
-        for moment, quantity, ewma in zip(moments, zip(values, low, high), zip(z, limit))
-    ]
-    caption = f"{title}, with 95 % intervals of each record; dashed: mean before the change. Below: EWMA and its limits."
+    caption = (
+        f"{title}, with 95 % intervals of each record; dashed: mean before the change. Below: EWMA and its limits; records at which it "
+        "is outside of them have the other colour."
+    )
     if series.imprecise:
         caption += f" {series.imprecise} records with much wider intervals are left out."
     if len(series.values) > _POINTS:
         caption += f" The last {_POINTS} of {len(series.values)} records."
-    return Figure(svg, caption, ["record", "value", "low", "high", "EWMA", "limit"], rows)
+    return Figure(svg, caption, _COLUMNS, rows)
 
 
 def _scale(low, high, start, end):

@@ -71,7 +71,8 @@ def _causes(causes):
 
 def _springs(springs):
     def causes(spring):
-        return "; ".join(f"{it.cause} since {it.since} ({it.found} of {it.of} records)" for it in spring.causes)
+        counted = lambda it: f"{it.found} of {it.of} record{'' if it.of == 1 else 's'}"
+        return "; ".join(f"{it.cause} since {it.since} ({counted(it)})" for it in spring.causes)
 
     def drifts(spring):
         return ", ".join(it.parameter for it in spring.drifts if it.stands)

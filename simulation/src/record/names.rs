@@ -63,6 +63,11 @@ impl Role {
         [&["time", "t", "timestamp", "datetime", "elapsed"][..], VOLTAGES, &[MEASURED]][self as usize]
     }
 
+    /// True if a column with a unit, or without one, can be this quantity: a command may have any unit but one of time.
+    fn fits(self, unit: Option<&str>) -> bool {
+        unit.is_none_or(|unit| (Unit::of_time(unit).is_ok()) == (self == Self::Time))
+    }
+
     /// True if a unit is one of this quantity.
     fn takes(self, unit: &str) -> bool {
         match self {
@@ -126,7 +131,7 @@ impl ColumnNames {
         Ok(Columns { time, voltage, reading })
     }
 
-    /// The only column that can have the role: by its name, or by its unit for a voltage or a reading.
+    /// The only column that can have the role: by its name, or by its unit.
     fn guess(table: &Table<'_>, role: Role, found: &[Option<Column>; 3]) -> Option<Column> {
         let free = || {
             let is_free = |index: usize| found.iter().flatten().all(|column| column.index != index);
@@ -138,7 +143,7 @@ impl ColumnNames {
             // A capital T is a temperature as often as a time.
             base != "T" && role.usual().contains(&plain(base).as_str()) && (unit.is_none() || has_unit(&unit))
         });
-        let by_unit = free().filter(|(_, name)| role != Role::Time && has_unit(&split_unit(name).1));
+        let by_unit = free().filter(|(_, name)| has_unit(&split_unit(name).1));
         let only = |columns: Vec<usize>| (columns.len() == 1).then(|| columns[0]);
         let by_name: Vec<usize> = by_name.map(|(index, _)| index).collect();
         let index = if by_name.is_empty() { only(by_unit.map(|(index, _)| index).collect()) } else { only(by_name) };
@@ -160,11 +165,14 @@ impl ColumnNames {
             }
         };
         let free: Vec<usize> = (0..table.columns().count()).filter(|index| !taken(*index)).take(MOST_COLUMNS).collect();
+        let fitting = |role: Role| {
+            free.iter().copied().filter(move |index| role.fits(split_unit(table.column(*index)).1.as_deref()))
+        };
         let options = Role::ALL.map(|role| {
             let option = if role == Role::Reading && self.stiffness.is_some() { "--column" } else { role.option() };
             let choice = match &found[role as usize] {
                 Some(column) => self.of(role).map_or_else(|| spec(column.index, role), str::to_owned),
-                None => match free.iter().map(|index| spec(*index, role)).collect::<Vec<_>>().as_slice() {
+                None => match fitting(role).map(|index| spec(index, role)).collect::<Vec<_>>().as_slice() {
                     [] => "NAME:UNIT".to_owned(),
                     [only] => only.clone(),
                     several => format!("one of {}", several.join(", ")),
@@ -319,6 +327,8 @@ mod tests {
         assert_eq!(found("time [h],pump_v,T1 (degC)\n", &none), Ok(units("h", "V", "degC")));
         assert_eq!(found(" TIME_MS ,Voltage_V,Stiffness [N/m]\n", &none), Ok(units("ms", "V", "N/m")));
         assert_eq!(found("Time,U,F_N,note\n", &none), Ok([(0, None), (1, None), (2, Some("N".into()))]));
+        // The only unit of time, in any language.
+        assert_eq!(found("Zeit [ms],Spannung [kV],Weg [mm]\n", &none), Ok(units("ms", "kV", "mm")));
         let error = found("t_ms,u_kV,x_mm,force_N\n", &none).unwrap_err();
         assert_eq!(
             error,
@@ -329,6 +339,11 @@ mod tests {
             ("Time,Q1,T1\n", "--time Time --voltage one of Q1, T1 --reading one of Q1, T1"),
             ("time_s,pump_v,level_v\n", "--time time_s:s --voltage one of pump_v:V, level_v:V"),
             ("T,U,x_mm\n", "--time T --voltage U --reading x_mm:mm"),
+            (
+                "start [h],end [h],u_V,x_mm\n",
+                "--time one of 'start [h]:h', 'end [h]:h' --voltage u_V:V --reading x_mm:mm",
+            ),
+            ("T,drive [%],x_mm,F_N\n", "--time T --voltage one of T, 'drive [%]', x_mm, F_N --reading one of"),
             ("time_s,voltage_v,strain\n", "no column `stiffness`"),
             (
                 "time_s,voltage_v,estimate\n",
