@@ -75,12 +75,15 @@ pub(super) struct Decision {
     doubted: i64,
     none: i64,
     least: [i64; CAUSES],
+    /// What the causes of [`NESTED`] leave that others contain, whatever their size is.
+    unbounded: [i64; NESTED.len()],
     best: u8,
     sizes: [Size; CAUSES],
     bar: i64,
     rivals: u32,
-    /// Leftover and size of the hypothesis in work.
+    /// Leftover of the hypothesis in work, within its bounds and without them, and its size.
     left: i64,
+    free: i64,
     now: Size,
     /// The two causes that leave least.
     first: (i64, Option<Cause>),
@@ -175,11 +178,13 @@ impl Decision {
         doubted: 0,
         none: 0,
         least: [i64::MAX; CAUSES],
+        unbounded: [i64::MAX; NESTED.len()],
         best: 0,
         sizes: [Size::NEW; CAUSES],
         bar: 0,
         rivals: 0,
         left: 0,
+        free: 0,
         now: Size::NEW,
         first: (0, None),
         second: (0, None),
@@ -315,7 +320,8 @@ impl Decision {
     fn bound(&mut self, config: &Config, last: u8) {
         let k = last - 1;
         let (mine, energy) = (self.scales[usize::from(k) & 7], self.scales[usize::from(last) & 7]);
-        self.left = i64::from(self.matrix[at(last, last)].max(0));
+        self.free = i64::from(self.matrix[at(last, last)].max(0));
+        self.left = self.free;
         let exponent = i32::from(energy) - i32::from(mine);
         let mut numerator = 0;
         if self.information > 0 {
@@ -334,6 +340,11 @@ impl Decision {
     fn record(&mut self, hypothesis: &Hypothesis) {
         let energy = i32::from(self.now.exponent) + i32::from(self.now.scale);
         let left = shifted(self.left, 2 * energy);
+        for ((inner, _), unbounded) in NESTED.into_iter().zip(&mut self.unbounded) {
+            if inner == hypothesis.cause {
+                *unbounded = shifted(self.free, 2 * energy);
+            }
+        }
         let cause = hypothesis.cause as u8;
         let entry = self.least.get_mut(usize::from(cause)).zip(self.sizes.get_mut(usize::from(cause)));
         if let Some((least, size)) = entry
@@ -375,9 +386,13 @@ impl Decision {
                 self.next(Stage::Contain);
             }
             Stage::Contain => {
-                for (inner, outer) in NESTED {
-                    let certain = inner != Cause::SensorSaturation || released;
-                    if certain && self.rivals & 1 << inner as u32 != 0 {
+                for ((inner, outer), unbounded) in NESTED.into_iter().zip(self.unbounded) {
+                    // A size of the first that is impossible is no reason for the second.
+                    let fits = match inner {
+                        Cause::SensorSaturation => released && self.rivals & 1 << inner as u32 != 0,
+                        _ => unbounded < self.bar,
+                    };
+                    if fits {
                         self.rivals &= !(1 << outer as u32);
                     }
                 }
