@@ -145,7 +145,7 @@ impl MonitorCheck {
             (false, true) => Some(Mismatch::Leakage),
             (true, true) => Some(Mismatch::Short),
             (true, false) if self.approaches(driven, monitors.voltage, config.tolerance) => Some(Mismatch::Slew),
-            (true, false) if excess(driven) > config.tolerance => Some(Mismatch::Reference),
+            (true, false) if excess(driven).is_positive() => Some(Mismatch::Reference),
             (true, false) if far(Volts::ZERO) => Some(Mismatch::Limit),
             (true, false) => Some(Mismatch::Open),
         }
