@@ -474,6 +474,17 @@ mod tests {
     /// Returns the verdict of as many equal decisions as have to agree, on 50 blocks: where `total` variances are to be explained, of which
     /// an error of the model may be `doubted`, and the causes leave so much more than the noise.
     fn verdict(total: i64, doubted: i64, left: &[(Cause, i64)]) -> Verdict {
+        verdict_of(total, doubted, left, [i64::MAX; NESTED.len()], false)
+    }
+
+    /// Returns the verdict where the causes of [`NESTED`] that others contain leave `unbounded` whatever their size is.
+    fn verdict_of(
+        total: i64,
+        doubted: i64,
+        left: &[(Cause, i64)],
+        unbounded: [i64; NESTED.len()],
+        released: bool,
+    ) -> Verdict {
         let config = Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
         let (mut decision, copy, noise) = (Decision::NEW, Products::NEW.copy, 50 * ONE);
         for _ in 0..thresholds::AGREED {
@@ -482,9 +493,10 @@ mod tests {
             for (cause, left) in left {
                 decision.least[*cause as usize] = noise + left;
             }
+            decision.unbounded = unbounded;
             decision.best = left.iter().min_by_key(|(_, left)| left).unwrap().0 as u8;
             while !decision.idle() {
-                decision.step(&config, &copy, false);
+                decision.step(&config, &copy, released);
             }
         }
         decision.verdict
@@ -514,6 +526,22 @@ mod tests {
         assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(Delay, Drift));
         let equal = [(GainError, 0), (Delay, ONE), (Drift, ONE)];
         assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(GainError, Delay));
+    }
+
+    /// A law contains every gain, and is named if no gain fits, whatever its size. Of the causes of identical readings the first is certain
+    /// only if a reading has been released.
+    #[test]
+    fn a_cause_that_contains_another_is_named_only_if_that_does_not_fit() {
+        use Cause::{SensorSaturation, StaticNonlinearity, StuckSensor};
+        // Noise, margin and 2^-10 of the total.
+        let bar = (50 + 20 + 1) * ONE;
+        let law = |gain| verdict_of(1024 * ONE, 0, &[(StaticNonlinearity, 0)], [gain, i64::MAX, i64::MAX], false);
+        assert_eq!([bar - 1, bar].map(law), [Verdict::Unknown, Verdict::Named(StaticNonlinearity)]);
+        let pinned = |left: &[(Cause, i64)], released| verdict_of(1024 * ONE, 0, left, [i64::MAX; 3], released);
+        let both = [(SensorSaturation, 0), (StuckSensor, 0)];
+        assert_eq!(pinned(&both, true), Verdict::Named(SensorSaturation));
+        assert_eq!(pinned(&both, false), Verdict::Ambiguous(SensorSaturation, StuckSensor));
+        assert_eq!(pinned(&both[1..], true), Verdict::Named(StuckSensor));
     }
 
     /// A shift to the left saturates, and one to the right rounds down, however far it goes.
