@@ -1,5 +1,6 @@
 //! `cargo xtask emulate --blocks`: instructions per tick for each kind of spring under each controller. One run of
-//! `test-bench/examples/blocks.rs` counts them; the digest of each combination is compared with the host's.
+//! `test-bench/examples/blocks.rs` counts them; the digest of each combination is compared with the host's, and at opt-level s the
+//! counts with what they were.
 
 use anyhow::{Result, ensure};
 use firmware::control::Untimed;
@@ -13,7 +14,21 @@ use crate::qemu::emulator;
 /// Mean and largest number of instructions per tick: one row for each spring, one column for each controller.
 type Table = Vec<[(u32, u32); CONTROLLERS.len()]>;
 
-/// Counts and prints the table. A digest that differs from the host's is an error.
+/// The table of docs/firmware.md, at opt-level s.
+const EXPECTED: [[(u32, u32); CONTROLLERS.len()]; SPRINGS.len()] = [
+    [(90, 90), (121, 121), (189, 189), (248, 265)],
+    [(154, 154), (223, 224), (470, 470), (888, 907)],
+    [(294, 294), (363, 363), (1133, 1305), (1640, 1863)],
+    [(222, 222), (291, 292), (629, 629), (1114, 1134)],
+    [(198, 199), (283, 284), (567, 567), (1101, 1121)],
+    [(202, 202), (271, 272), (616, 616), (1084, 1104)],
+    [(171, 172), (246, 246), (510, 510), (972, 992)],
+    [(205, 205), (292, 292), (590, 590), (1142, 1162)],
+    [(505, 505), (608, 608), (1648, 1812), (2521, 2738)],
+];
+
+/// Counts and prints the table. A digest that differs from the host's is an error, and so is a count that is more than 5 % above or below
+/// what it was.
 pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     let counted = count(opt)?;
     if as_json {
@@ -21,7 +36,25 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     } else {
         print!("{}", table(opt, &counted));
     }
+    if opt == Opt::S { check(&counted) } else { Ok(()) }
+}
+
+fn check(counted: &Table) -> Result<()> {
+    for (((spring, _), row), expected) in SPRINGS.iter().zip(counted).zip(EXPECTED) {
+        for (((controller, _), &is), was) in CONTROLLERS.iter().zip(row).zip(expected) {
+            ensure!(
+                near(is.0, was.0) && near(is.1, was.1),
+                "{spring}, {controller}: {is:?} instructions (mean, max), expected {was:?} within 5 %: if that is right, \
+                 change the table here and in docs/firmware.md"
+            );
+        }
+    }
     Ok(())
+}
+
+/// True if a count differs by at most 5 % from what it was, either way.
+pub(crate) fn near(is: u32, was: u32) -> bool {
+    20 * is.abs_diff(was) <= was
 }
 
 fn count(opt: Opt) -> Result<Table> {
@@ -63,4 +96,34 @@ fn report(opt: Opt, counted: &Table) -> Value {
         })
     });
     json!({"opt": opt.name(), "rows": rows.collect::<Vec<_>>()})
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_that_is_five_percent_off_either_way_is_an_error() {
+        let with = |row: usize, column: usize, (mean, most): (u32, u32)| {
+            let mut counted = EXPECTED.to_vec();
+            counted[row][column] = (mean, most);
+            check(&counted)
+        };
+        assert!(with(0, 0, (90, 90)).is_ok() && with(0, 0, (86, 94)).is_ok());
+        for (mean, most) in [(85, 90), (95, 90), (90, 85), (90, 95)] {
+            assert!(with(0, 0, (mean, most)).is_err(), "{mean} {most}");
+        }
+        let error = with(8, 3, (2521, 3000)).unwrap_err().to_string();
+        assert!(
+            error.starts_with("all of it, robust: (2521, 3000) instructions (mean, max), expected (2521, 2738)"),
+            "{error}"
+        );
+    }
+
+    /// The page shows the counts that are compared with.
+    #[test]
+    fn the_page_shows_the_expected_counts() {
+        let page = std::fs::read_to_string(xtask::shell::root().join("docs/firmware.md")).unwrap();
+        assert!(page.contains(&table(Opt::S, &EXPECTED.to_vec())), "{}", table(Opt::S, &EXPECTED.to_vec()));
+    }
 }

@@ -8,9 +8,16 @@ use serde_json::json;
 use test_bench::isolation::run as on_this_machine;
 use xtask::build::Opt;
 
+use crate::blocks::near;
 use crate::qemu::emulator;
 
-/// Counts and prints. A digest that differs from the host's is an error.
+/// Least, mean and largest number of instructions at opt-level s, of the bank and of the adaptation.
+const EXPECTED: [[u32; 3]; 2] = [[24, 107, 545], [26, 27, 2330]];
+/// Largest mean of the bank: as much again as the tick of the controller.
+const MOST_MEAN: u32 = 108;
+
+/// Counts and prints. A digest that differs from the host's is an error, and so is a count that is more than 5 % above or below what it
+/// was, or a bank that takes more than the controller.
 pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
     let run = emulator::count("isolation", "mps2-an386", opt)?;
     let values = run.values("isolation ")?;
@@ -35,6 +42,10 @@ pub(crate) fn run(opt: Opt, as_json: bool) -> Result<()> {
             "adaptation, after the bank's tick: {min} instructions, mean {mean}, {max} in an exchange; every code as on the host"
         );
     }
+    ensure!(mean <= MOST_MEAN, "the bank takes {mean} instructions on average, the tick {MOST_MEAN}");
+    let same =
+        [[min, mean, max], adaptation].iter().flatten().zip(EXPECTED.iter().flatten()).all(|(is, was)| near(*is, *was));
+    ensure!(opt != Opt::S || same, "least, mean and most of bank and adaptation were {EXPECTED:?} within 5 %");
     Ok(())
 }
 

@@ -141,7 +141,8 @@ Examples:
     #[command(after_help = "\
 Examples:
   cargo xtask soak                                     100 million ticks
-  cargo xtask soak --ticks 1000000")]
+  cargo xtask soak --ticks 1000000
+  cargo xtask soak --emulated                          an hour of the emulated board")]
     Soak(soak::Args),
 }
 

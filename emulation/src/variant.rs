@@ -20,13 +20,13 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
 }
 
 /// The number of instructions that a control tick with voltage may need, at least and at most, supervisor included. The
-/// ends are 5 % beyond those that were measured: 291 to 320 with the paper's controller, 361 to 390 with the fast and 421 to 467 with the
-/// robust one, with an amplifier of 700 V.
+/// ends are 5 % beyond those that were measured: 300 to 329 with the paper's controller, 370 to 401 with the fast and 426 to 475 with the
+/// robust one, whatever the amplifier's limit.
 pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
     match variant.controller {
-        Controller::Paper => 276..=336,
-        Controller::Fast => 343..=410,
-        Controller::Robust => 400..=491,
+        Controller::Paper => 285..=345,
+        Controller::Fast => 352..=421,
+        Controller::Robust => 405..=499,
     }
 }
 

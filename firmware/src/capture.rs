@@ -94,6 +94,8 @@ mod tests {
 
     fn codes(recorder: &Recorder, memory: &[AtomicU32], first: u32) -> Vec<u16> {
         let Reply::Rows(rows) = recorder.execute(memory, Capture::Read { first }) else { panic!() };
+        // Of one tick each: [`sample`] has code and estimate of its number.
+        assert!(rows.iter().all(|row| row.stiffness == WireVolts(-i32::from(row.code))), "words of two rows are mixed");
         rows.iter().map(|row| row.code).collect()
     }
 

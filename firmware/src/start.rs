@@ -394,6 +394,16 @@ mod tests {
                 assert!(matches!(wide, Err(Reason::BadSettings { field: found, .. }) if found == field));
             }
         }
+        // Also without a sensor, which an image with neither of them refuses.
+        if !cfg!(feature = "isolation") {
+            let trip = WireSettings { trip_on_cause: 0x8000, ..built_in_settings() };
+            assert_eq!(check(trip), contains(false, "trip_on_cause"));
+        }
+        if !cfg!(feature = "adaptation") {
+            let adapts =
+                WireSettings { adaptation: Some(adaptation::Settings::TYPICAL.values()), ..built_in_settings() };
+            assert_eq!(check(adapts), contains(false, "adaptation.enabled"));
+        }
         assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
     }
 

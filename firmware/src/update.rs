@@ -35,3 +35,37 @@ pub fn execute<P: Pages>(
 pub fn settings_part(settings: &device::Settings, number: u8) -> Part {
     Part::of(number, &WireSettings::new(settings).payload().unwrap_or_default())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::BUILT_IN;
+    use crate::store::Memory;
+    use link::{WireModel, frame};
+
+    /// Sends a payload in parts and ends it; returns what each part and the end were answered.
+    fn send(store: &mut Store<Memory>, block: Block, payload: &[u8]) -> Result<Option<BlockId>, Reason> {
+        for (number, bytes) in (0..).zip(payload.chunks(link::block::PART)) {
+            let bytes: std::vec::Vec<u8> = bytes.iter().copied().chain([0; link::block::PART]).collect();
+            let part = Update::Part(number, *bytes.first_chunk().unwrap());
+            assert_eq!(execute(store, block, part, &BUILT_IN), Ok(None), "part {number}");
+        }
+        let end = Update::End { length: payload.len() as u16, checksum: frame::checksum(payload) };
+        execute(store, block, end, &BUILT_IN)
+    }
+
+    #[test]
+    fn a_block_is_stored_once_it_is_complete_and_valid_and_its_identity_is_returned() {
+        let mut store = Store::new(Memory::default());
+        let model = WireModel { share: 0.1, time_constants_s: [5.5].into_iter().collect(), ..WireModel::default() };
+        let model = model.payload().unwrap();
+        let settings = WireSettings::new(&BUILT_IN).payload().unwrap();
+        for (block, payload) in [(Block::Model, &model[..]), (Block::Settings, &settings[..])] {
+            let id = BlockId::of(1, payload);
+            assert_eq!(send(&mut store, block, payload), Ok(Some(id)), "{block:?}");
+            assert_eq!(store.newest(block).map(|(id, stored)| (id, stored.to_vec())), Some((id, payload.to_vec())));
+            assert_eq!(send(&mut store, block, b"noise"), Err(Reason::Damaged), "{block:?}");
+            assert_eq!(store.newest(block).map(|(id, _)| id), Some(id), "the old content remains");
+        }
+    }
+}

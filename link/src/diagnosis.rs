@@ -48,9 +48,9 @@ mod tests {
 
     #[test]
     fn codes_are_stable_and_have_names() {
-        let names = |name: fn(u8) -> &'static str| (0..8).map(name).collect::<std::vec::Vec<_>>().join(" ");
-        assert_eq!(names(|code| Mismatch(code).name()), "none limit open short leakage reference held unknown");
-        let sensor = "none trusted absent stale stuck jumping out-of-range unknown";
+        let names = |name: fn(u8) -> &'static str| (0..9).map(name).collect::<std::vec::Vec<_>>().join(" ");
+        assert_eq!(names(|code| Mismatch(code).name()), "none limit open short leakage reference held slew unknown");
+        let sensor = "none trusted absent stale stuck jumping out-of-range unknown unknown";
         assert_eq!(names(|code| Sensor(code).name()), sensor);
         assert_eq!(Mismatch::from(Some(supervisor::Mismatch::Short)), Mismatch(3));
         assert_eq!((Mismatch::from(None), Sensor::from(None)), (Mismatch(0), Sensor(0)));

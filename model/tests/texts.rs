@@ -21,7 +21,7 @@ fn each_fault_says_how_it_is_detected_and_what_a_person_does() {
 #[test]
 fn each_mismatch_has_a_name_and_a_code() {
     own_words(&Mismatch::ALL.map(Mismatch::name), 4);
-    assert!(Mismatch::ALL.iter().map(|mismatch| mismatch.code()).eq(1..=6));
+    assert!(Mismatch::ALL.iter().map(|mismatch| mismatch.code()).eq(1..=7));
 }
 
 #[cfg(feature = "feedback")]

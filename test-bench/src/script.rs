@@ -8,6 +8,7 @@
 //! | `up-down robust` | `up-down` with the controller for a spring that is known to within errors (feature `robust`). |
 //! | `up-down sensor`, `up-down fast sensor`, `up-down robust sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
 //! | `random SEED` | 100 000 ticks with random arming, disarming, targets, interlock openings and silences of the host. |
+//! | `hour SEED` | An hour of the same. |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence`, `unguarded` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
 //! | (after a reset by a fault) | The output must stay disabled until the fault is acknowledged. |
 
@@ -29,6 +30,8 @@ pub const STAIR_TICKS: u32 = 70_000;
 pub const UP_DOWN_TICKS: u32 = 95_000;
 /// Number of ticks of a random run, 100 s.
 pub const RANDOM_TICKS: u32 = 100_000;
+/// Number of ticks of an hour.
+pub const HOUR_TICKS: u32 = 3_600_000;
 /// Tick in which a drill arms.
 pub const ARM_TICK: u32 = 10;
 /// Tick in which a drill injects its fault.
@@ -141,7 +144,7 @@ pub enum Script {
     Stair,
     /// Run `up-down` with this controller.
     UpDown(&'static Controller),
-    /// Run `random`.
+    /// Run `random` or `hour`.
     Random(Random),
     /// Drill with this fault.
     Drill(FaultInjection),
@@ -152,8 +155,16 @@ pub enum Script {
 impl Script {
     /// The random run with this seed.
     pub const fn random(seed: u32) -> Self {
-        // The generator never leaves the state zero.
-        Self::Random(Random { numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 })
+        Self::random_ticks(seed, RANDOM_TICKS)
+    }
+
+    /// The random run with this seed that lasts for an hour.
+    pub const fn hour(seed: u32) -> Self {
+        Self::random_ticks(seed, HOUR_TICKS)
+    }
+
+    const fn random_ticks(seed: u32, ticks: u32) -> Self {
+        Self::Random(Random { ticks, numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 })
     }
 
     /// The script with this name, see the table of this module; `None` if there is none.
@@ -167,6 +178,9 @@ impl Script {
         }
         if let Some(seed) = name.strip_prefix("random ") {
             return seed.parse().ok().map(Self::random);
+        }
+        if let Some(seed) = name.strip_prefix("hour ") {
+            return seed.parse().ok().map(Self::hour);
         }
         FaultInjection::ALL.into_iter().find(|fault| fault.name() == name).map(Self::Drill)
     }
@@ -184,7 +198,7 @@ impl Script {
         match self {
             Self::Stair => STAIR_TICKS,
             Self::UpDown(_) => UP_DOWN_TICKS,
-            Self::Random(_) => RANDOM_TICKS,
+            Self::Random(random) => random.ticks,
             Self::Drill(_) => 1500,
             Self::Aftermath => 200,
         }
@@ -266,6 +280,7 @@ fn aftermath(tick: u32) -> Option<supervisor::Command> {
 /// State of a random run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Random {
+    ticks: u32,
     numbers: Xorshift,
     open_until: u32,
     silent_until: u32,
@@ -307,8 +322,9 @@ mod tests {
         assert_eq!(Script::parse("up-down robust").is_some(), cfg!(feature = "robust"));
         assert_eq!(Script::parse("up-down sensor").is_some(), cfg!(feature = "feedback"));
         assert_eq!(Script::parse("random 7"), Some(Script::random(7)));
+        assert_eq!(Script::parse("hour 7"), Some(Script::hour(7)));
         assert_eq!(Script::parse("stall\n"), Some(Script::Drill(FaultInjection::Stall)));
-        assert_eq!((Script::parse("random"), Script::parse("")), (None, None));
+        assert_eq!(["random", "hour", "hour x", ""].map(Script::parse), [None; 4]);
     }
 
     #[test]

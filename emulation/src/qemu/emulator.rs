@@ -179,12 +179,28 @@ pub(crate) fn play(elf: &Path, script: &str, shift: u32, show: impl FnMut(&str) 
     play_in(shell::root(), elf, script, shift, show)
 }
 
+/// Runs `script` to its end, or for `most` on the host's clock.
+pub(crate) fn play_long(elf: &Path, script: &str, most: Duration) -> Result<Run> {
+    play_for(shell::root(), elf, script, SHIFT, most, |_| {})
+}
+
 /// Does what [`play`] does, with the board's files in `folder`.
 pub(crate) fn play_in(
     folder: &Path,
     elf: &Path,
     script: &str,
     shift: u32,
+    show: impl FnMut(&str) + Send,
+) -> Result<Run> {
+    play_for(folder, elf, script, shift, TIMEOUT, show)
+}
+
+fn play_for(
+    folder: &Path,
+    elf: &Path,
+    script: &str,
+    shift: u32,
+    most: Duration,
     show: impl FnMut(&str) + Send,
 ) -> Result<Run> {
     let formats = Formats::parse(&build::read(elf)?)?;
@@ -199,7 +215,7 @@ pub(crate) fn play_in(
             over.store(true, Ordering::Relaxed);
             log
         });
-        while !over.load(Ordering::Relaxed) && begin.elapsed() < TIMEOUT {
+        while !over.load(Ordering::Relaxed) && begin.elapsed() < most {
             thread::sleep(Duration::from_millis(5));
         }
         if !over.load(Ordering::Relaxed) {
@@ -210,7 +226,7 @@ pub(crate) fn play_in(
     })?;
     let took = begin.elapsed();
     let dac = fs::read(&wire)?;
-    if took >= TIMEOUT {
+    if took >= most {
         let last = log.lines.last().map(text);
         bail!("the emulator was stopped after {} s; the log's last line is {last:?}", took.as_secs());
     }

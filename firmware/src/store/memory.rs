@@ -28,3 +28,19 @@ impl Pages for Memory {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Side;
+    use link::Block;
+
+    #[test]
+    fn an_erased_page_is_all_ones_again() {
+        let (mut memory, page) = (Memory::default(), Page { block: Block::Model, side: Side::A });
+        memory.program(page, WORD, [0x55; WORD]).unwrap();
+        assert_eq!(memory.bytes(page)[WORD], 0x55);
+        memory.erase(page).unwrap();
+        assert!(memory.bytes(page).iter().all(|byte| *byte == 0xff));
+    }
+}

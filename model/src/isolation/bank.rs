@@ -142,7 +142,7 @@ const fn of(cause: Cause, vectors: &'static [usize], lowest: f64, highest: f64) 
 
 /// The hypotheses. The first vector is the nuisance [`INITIAL`], except of pinned readings.
 pub const HYPOTHESES: [Hypothesis; 26] = [
-    of(Cause::GainError, &[INITIAL, GAIN], -0.7, 0.7),
+    of(Cause::GainError, &[INITIAL, GAIN], -0.7, 4.0),
     of(Cause::InstantaneousShare, &[INITIAL, SHARE], -0.1, 0.8),
     of(Cause::TimeConstant, &[INITIAL, TAU_CURVED, TAU], -1.5, 1.5),
     of(Cause::VoltageDependentTimeConstant, &[INITIAL, TAU_CURVED, TAU, TAU_VOLTAGE], -3.0, 3.0),
@@ -170,7 +170,8 @@ pub const HYPOTHESES: [Hypothesis; 26] = [
     of(Cause::StuckSensor, &[PINNED], 0.9, 1.1),
 ];
 
-/// Pairs of causes of which the second contains the first: it always leaves less, and is named only if the first is excluded.
+/// Pairs of causes of which the second contains the first: it always leaves less, and is named only if the first is excluded, and not by
+/// the bounds of its size alone.
 pub const NESTED: [(Cause, Cause); 3] = [
     (Cause::GainError, Cause::StaticNonlinearity),
     (Cause::TimeConstant, Cause::VoltageDependentTimeConstant),

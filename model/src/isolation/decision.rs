@@ -75,12 +75,15 @@ pub(super) struct Decision {
     doubted: i64,
     none: i64,
     least: [i64; CAUSES],
+    /// What the causes of [`NESTED`] leave that others contain, whatever their size is.
+    unbounded: [i64; NESTED.len()],
     best: u8,
     sizes: [Size; CAUSES],
     bar: i64,
     rivals: u32,
-    /// Leftover and size of the hypothesis in work.
+    /// Leftover of the hypothesis in work, within its bounds and without them, and its size.
     left: i64,
+    free: i64,
     now: Size,
     /// The two causes that leave least.
     first: (i64, Option<Cause>),
@@ -175,11 +178,13 @@ impl Decision {
         doubted: 0,
         none: 0,
         least: [i64::MAX; CAUSES],
+        unbounded: [i64::MAX; NESTED.len()],
         best: 0,
         sizes: [Size::NEW; CAUSES],
         bar: 0,
         rivals: 0,
         left: 0,
+        free: 0,
         now: Size::NEW,
         first: (0, None),
         second: (0, None),
@@ -315,7 +320,8 @@ impl Decision {
     fn bound(&mut self, config: &Config, last: u8) {
         let k = last - 1;
         let (mine, energy) = (self.scales[usize::from(k) & 7], self.scales[usize::from(last) & 7]);
-        self.left = i64::from(self.matrix[at(last, last)].max(0));
+        self.free = i64::from(self.matrix[at(last, last)].max(0));
+        self.left = self.free;
         let exponent = i32::from(energy) - i32::from(mine);
         let mut numerator = 0;
         if self.information > 0 {
@@ -334,6 +340,11 @@ impl Decision {
     fn record(&mut self, hypothesis: &Hypothesis) {
         let energy = i32::from(self.now.exponent) + i32::from(self.now.scale);
         let left = shifted(self.left, 2 * energy);
+        for ((inner, _), unbounded) in NESTED.into_iter().zip(&mut self.unbounded) {
+            if inner == hypothesis.cause {
+                *unbounded = shifted(self.free, 2 * energy);
+            }
+        }
         let cause = hypothesis.cause as u8;
         let entry = self.least.get_mut(usize::from(cause)).zip(self.sizes.get_mut(usize::from(cause)));
         if let Some((least, size)) = entry
@@ -375,9 +386,13 @@ impl Decision {
                 self.next(Stage::Contain);
             }
             Stage::Contain => {
-                for (inner, outer) in NESTED {
-                    let certain = inner != Cause::SensorSaturation || released;
-                    if certain && self.rivals & 1 << inner as u32 != 0 {
+                for ((inner, outer), unbounded) in NESTED.into_iter().zip(self.unbounded) {
+                    // A size of the first that is impossible is no reason for the second.
+                    let fits = match inner {
+                        Cause::SensorSaturation => released && self.rivals & 1 << inner as u32 != 0,
+                        _ => unbounded < self.bar,
+                    };
+                    if fits {
                         self.rivals &= !(1 << outer as u32);
                     }
                 }
@@ -459,6 +474,17 @@ mod tests {
     /// Returns the verdict of as many equal decisions as have to agree, on 50 blocks: where `total` variances are to be explained, of which
     /// an error of the model may be `doubted`, and the causes leave so much more than the noise.
     fn verdict(total: i64, doubted: i64, left: &[(Cause, i64)]) -> Verdict {
+        verdict_of(total, doubted, left, [i64::MAX; NESTED.len()], false)
+    }
+
+    /// Returns the verdict where the causes of [`NESTED`] that others contain leave `unbounded` whatever their size is.
+    fn verdict_of(
+        total: i64,
+        doubted: i64,
+        left: &[(Cause, i64)],
+        unbounded: [i64; NESTED.len()],
+        released: bool,
+    ) -> Verdict {
         let config = Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize();
         let (mut decision, copy, noise) = (Decision::NEW, Products::NEW.copy, 50 * ONE);
         for _ in 0..thresholds::AGREED {
@@ -467,9 +493,10 @@ mod tests {
             for (cause, left) in left {
                 decision.least[*cause as usize] = noise + left;
             }
+            decision.unbounded = unbounded;
             decision.best = left.iter().min_by_key(|(_, left)| left).unwrap().0 as u8;
             while !decision.idle() {
-                decision.step(&config, &copy, false);
+                decision.step(&config, &copy, released);
             }
         }
         decision.verdict
@@ -499,6 +526,22 @@ mod tests {
         assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(Delay, Drift));
         let equal = [(GainError, 0), (Delay, ONE), (Drift, ONE)];
         assert_eq!(verdict(1024 * ONE, 0, &equal), Verdict::Ambiguous(GainError, Delay));
+    }
+
+    /// A law contains every gain, and is named if no gain fits, whatever its size. Of the causes of identical readings the first is certain
+    /// only if a reading has been released.
+    #[test]
+    fn a_cause_that_contains_another_is_named_only_if_that_does_not_fit() {
+        use Cause::{SensorSaturation, StaticNonlinearity, StuckSensor};
+        // Noise, margin and 2^-10 of the total.
+        let bar = (50 + 20 + 1) * ONE;
+        let law = |gain| verdict_of(1024 * ONE, 0, &[(StaticNonlinearity, 0)], [gain, i64::MAX, i64::MAX], false);
+        assert_eq!([bar - 1, bar].map(law), [Verdict::Unknown, Verdict::Named(StaticNonlinearity)]);
+        let pinned = |left: &[(Cause, i64)], released| verdict_of(1024 * ONE, 0, left, [i64::MAX; 3], released);
+        let both = [(SensorSaturation, 0), (StuckSensor, 0)];
+        assert_eq!(pinned(&both, true), Verdict::Named(SensorSaturation));
+        assert_eq!(pinned(&both, false), Verdict::Ambiguous(SensorSaturation, StuckSensor));
+        assert_eq!(pinned(&both[1..], true), Verdict::Named(StuckSensor));
     }
 
     /// A shift to the left saturates, and one to the right rounds down, however far it goes.

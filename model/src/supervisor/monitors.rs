@@ -13,12 +13,19 @@
 //! as long as the spring takes to discharge. A tick that agrees takes off one that disagreed, so that a noisy monitor is
 //! a fault as well: if a fraction `p > 1/2` of its readings disagrees, within `1 / (2 p - 1)` of these times on average.
 //!
+//! An amplifier that is too slow is distinguished from one that is at a limit, or has another scale, by the second half of that time: its
+//! voltage still approaches the expected one. An approach of less than twice what the expected voltage itself moves does not count, since
+//! an amplifier with another scale follows it as well.
+//!
 //! Not detectable: a monitor that disagrees in less than half of the ticks, which an amplifier that settles after each
 //! change does too; a reading that is late by less than the amplifier may take to settle; a load that is disconnected,
 //! because the current of a change has passed between two readings.
 
 use super::settings::Config;
-use crate::units::Volts;
+use crate::units::{Signal, Volts};
+
+/// Smallest approach to the expected voltage by which a slow amplifier is recognised, as a binary fraction of the tolerance: 1/16.
+const APPROACH_BITS: u32 = 4;
 
 /// Readings of the amplifier's monitors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,11 +54,14 @@ pub enum Mismatch {
     Reference = 5,
     /// The output is disabled, and there is a voltage or a current.
     Held = 6,
+    /// The voltage approaches the expected one, but too slowly, and the current is not too large.
+    Slew = 7,
 }
 
 impl Mismatch {
     /// Every kind, in the order of the numbers.
-    pub const ALL: [Self; 6] = [Self::Limit, Self::Open, Self::Short, Self::Leakage, Self::Reference, Self::Held];
+    pub const ALL: [Self; 7] =
+        [Self::Limit, Self::Open, Self::Short, Self::Leakage, Self::Reference, Self::Held, Self::Slew];
 
     /// Returns the stable number, 1 to 255; zero stands for no disagreement.
     pub const fn code(self) -> u8 {
@@ -67,6 +77,7 @@ impl Mismatch {
             Self::Leakage => "leakage",
             Self::Reference => "reference",
             Self::Held => "held",
+            Self::Slew => "slew",
         }
     }
 }
@@ -79,11 +90,13 @@ pub(super) struct MonitorCheck {
     ticks: u32,
     /// What disagreed in the last tick.
     mismatch: Option<Mismatch>,
+    /// The expected voltage and its reading in the last tick of the first half of the time that a disagreement may last.
+    halfway: (Volts, Volts),
 }
 
 impl MonitorCheck {
     /// The output is disabled, and no disagreement was seen.
-    pub(super) const NEW: Self = Self { driven: None, ticks: 0, mismatch: None };
+    pub(super) const NEW: Self = Self { driven: None, ticks: 0, mismatch: None, halfway: (Volts::ZERO, Volts::ZERO) };
 
     /// Sets the voltage with which the next readings are compared; `None` if the output is disabled. The counter
     /// restarts when the output is enabled or disabled.
@@ -98,6 +111,11 @@ impl MonitorCheck {
     pub(super) fn update(&mut self, config: &Config, monitors: Option<Monitors>) -> bool {
         self.mismatch = monitors.and_then(|monitors| self.compare(config, &monitors));
         let allowed = if self.driven.is_some() { config.monitor_ticks } else { config.discharge_ticks };
+        if let (Some(driven), Some(monitors)) = (self.driven, monitors)
+            && self.ticks <= allowed / 2
+        {
+            self.halfway = (driven, monitors.voltage);
+        }
         // Counted no further than to the fault, so that it is forgotten within the same time.
         self.ticks = match self.mismatch {
             Some(_) => self.ticks.min(allowed).saturating_add(1),
@@ -126,9 +144,19 @@ impl MonitorCheck {
             (false, false) => None,
             (false, true) => Some(Mismatch::Leakage),
             (true, true) => Some(Mismatch::Short),
-            (true, false) if excess(driven) > config.tolerance => Some(Mismatch::Reference),
+            (true, false) if self.approaches(driven, monitors.voltage, config.tolerance) => Some(Mismatch::Slew),
+            (true, false) if excess(driven).is_positive() => Some(Mismatch::Reference),
             (true, false) if far(Volts::ZERO) => Some(Mismatch::Limit),
             (true, false) => Some(Mismatch::Open),
         }
+    }
+
+    /// Returns true if the voltage has come closer to the expected one since half of the allowed time, and not because that has moved.
+    fn approaches(&self, driven: Volts, voltage: Volts, tolerance: Signal) -> bool {
+        let (driven_before, voltage_before) = self.halfway;
+        let distance = |from: Volts| driven.0.saturating_sub(from.0).saturating_abs();
+        let approach = distance(voltage_before).saturating_sub(distance(voltage));
+        let expected = distance(driven_before);
+        approach > expected.saturating_add(expected).saturating_add(tolerance >> APPROACH_BITS)
     }
 }

@@ -9,10 +9,12 @@
 //! | [`stair`] | the targets, and the figures of each step response |
 //! | [`scenario`] | one run of the loop, tick by tick |
 //! | [`effects`] | every effect, with a sensor and without |
+//! | [`requirement`] | each step within 0.6 s, or as fast as the spring can be, with little overshoot |
 //! | [`sensor_failure`] | a sensor that fails and recovers |
 //! | [`tables`] | results as Markdown |
 
 pub mod effects;
+pub mod requirement;
 pub mod scenario;
 pub mod sensor_failure;
 pub mod stair;

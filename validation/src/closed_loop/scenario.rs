@@ -57,13 +57,27 @@ impl Scenario {
     pub fn run(
         &self,
         settings: &Settings,
+        sense: impl FnMut(usize, f64) -> Option<Reading>,
+    ) -> Result<Vec<Sample>, OutOfRange> {
+        self.run_watched(settings, sense, |_, _| ())
+    }
+
+    /// Does what [`Scenario::run`] does, and calls `before` with the spring before each tick.
+    ///
+    /// # Errors
+    /// The model rejects the settings.
+    pub fn run_watched(
+        &self,
+        settings: &Settings,
         mut sense: impl FnMut(usize, f64) -> Option<Reading>,
+        mut before: impl FnMut(usize, &Live),
     ) -> Result<Vec<Sample>, OutOfRange> {
         let config: Config = settings.validate()?.quantize();
         let mut state = State::default();
         let ticks = (stair::duration_s() * settings.rate_hz).round() as usize;
         let mut live = Live::new(&self.effects, self.noise, self.seed, 500.0, ticks);
         let tick = |k: usize| {
+            before(k, &live);
             let target = Volts::new(stair::target_v(k as f64 / settings.rate_hz))?;
             let measured = sense(k, live.read().read);
             let output = config.tick(&mut state, Input { target, measured });

@@ -186,3 +186,18 @@ fn what_is_not_certain_is_not_named() {
         assert_eq!((found, all), (verdict, digest), "{all:#x}");
     }
 }
+
+/// A sensor with the wrong sign has a gain beyond what can be named. No curve of a law explains it.
+#[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
+fn a_gain_of_any_size_is_no_static_nonlinearity() {
+    let gained = |gain: f64| watched(&Spring { gain, ..HEALTHY_SPRING });
+    for gain in [0.5, 2.0, 2.9] {
+        let (verdict, size, _) = gained(gain);
+        assert_eq!(verdict, Verdict::Named(Cause::GainError), "{gain}");
+        assert!((size / (gain - 1.0) - 1.0).abs() < 0.01, "{gain}: {size}");
+    }
+    for gain in [-1.0, -0.5] {
+        assert_eq!(gained(gain).0, Verdict::Unknown, "{gain}");
+    }
+}

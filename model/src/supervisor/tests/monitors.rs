@@ -183,3 +183,49 @@ fn a_wrong_supply_of_the_converters_is_a_fault_in_every_state_and_nothing_is_arm
     tick(&mut supervisor, wrong(disarm()));
     assert_eq!((supervisor.state(), supervisor.refusal()), (State::Faulted(Fault::Monitor), Some(Refusal::Reference)));
 }
+
+/// Runs an armed supervisor until the fault, with the expected voltage and its reading in each tick; returns what is named.
+fn named(driven_at: impl Fn(u32) -> f64, volts_at: impl Fn(u32) -> f64) -> Option<Mismatch> {
+    let mut supervisor = armed();
+    for now in 0..60 {
+        supervisor.release(&output(driven_at(now)));
+        supervisor.decide(&reading(volts_at(now), 0, good()));
+    }
+    assert_eq!(supervisor.state(), State::Faulted(Fault::Monitor));
+    supervisor.mismatch()
+}
+
+/// Its voltage moves by 2.2 V or more, a sixteenth of the tolerance, within the second half of 50 ms.
+#[test]
+fn an_amplifier_that_is_too_slow_is_distinguished_from_one_at_a_limit_or_with_another_scale() {
+    let slewed = |from_v: f64, rate_v: f64| move |now: u32| from_v + rate_v * f64::from(now);
+    let still = |_| 300.0;
+    for rate_v in [0.1, 0.5, 2.0] {
+        assert_eq!(named(still, slewed(100.0, rate_v)), Some(Mismatch::Slew), "rising by {rate_v} V in a tick");
+        assert_eq!(named(still, slewed(500.0, -rate_v)), Some(Mismatch::Slew), "falling by {rate_v} V in a tick");
+    }
+    assert_eq!(named(still, slewed(0.0, 0.1)), Some(Mismatch::Slew), "it begins to move");
+    assert_eq!(named(still, slewed(100.0, 0.05)), Some(Mismatch::Limit), "1.3 V in 25 ms");
+    assert_eq!(named(still, slewed(200.0, -0.5)), Some(Mismatch::Limit), "away from the expected voltage");
+    assert_eq!(named(still, slewed(400.0, 0.5)), Some(Mismatch::Reference), "away from the expected voltage");
+    // It was on its way to its limit in the first half.
+    assert_eq!(named(still, |now| 100.0 + 10.0 * f64::from(now.min(12))), Some(Mismatch::Limit));
+    let falling = |now: u32| 300.0 - 0.4 * f64::from(now);
+    assert_eq!(named(falling, |now| 1.43 * falling(now)), Some(Mismatch::Reference), "the scale of another amplifier");
+    assert_eq!(named(falling, slewed(500.0, -1.0)), Some(Mismatch::Slew), "and a slow one meanwhile");
+}
+
+/// The reading after 25 ms is compared with the one after 50 ms.
+#[test]
+fn a_slow_amplifier_is_recognised_from_an_approach_of_a_sixteenth_of_the_tolerance_on() {
+    let step_v = 1.0 / f64::from(1 << 20);
+    let rises = |by_v: f64| move |now: u32| if now <= 25 { 100.0 } else { 100.0 + by_v };
+    assert_eq!(named(|_| 300.0, rises(35.0 / 16.0)), Some(Mismatch::Limit));
+    assert_eq!(named(|_| 300.0, rises(35.0 / 16.0 + step_v)), Some(Mismatch::Slew));
+    let earlier = |now: u32| if now < 25 { 100.0 } else { 110.0 };
+    assert_eq!(named(|_| 300.0, earlier), Some(Mismatch::Limit), "the last reading of the first half counts");
+    // While the expected voltage rises by 1 V, the approach has to be 2 V more.
+    let driven = |now: u32| if now <= 25 { 300.0 } else { 301.0 };
+    assert_eq!(named(driven, rises(35.0 / 16.0 + 2.0)), Some(Mismatch::Limit));
+    assert_eq!(named(driven, rises(35.0 / 16.0 + 2.0 + step_v)), Some(Mismatch::Slew));
+}

@@ -1,0 +1,205 @@
+//! The requirement of a robot on a spring with an effect: every step upward within 0.6 s, or as fast as this spring can be, and at most 2 %
+//! of overshoot.
+//!
+//! The shortest possible time is that of the same spring, from the state in which the step begins, under the amplifier's full voltage: no
+//! other voltage is at 97 % earlier.
+
+use std::ops::Range;
+
+use model::{OutOfRange, Settings};
+use rayon::prelude::*;
+
+use super::scenario::{Scenario, fresh};
+use super::stair::{self, HOLD_S, LEVELS_V};
+use crate::criterion::Criterion;
+use crate::ground_truth::{Cause, Live};
+use crate::markdown::table;
+
+/// Time in which a step has to reach 97 %, in s.
+pub const WITHIN_S: f64 = 0.6;
+/// Largest multiple of the shortest possible time, where that is longer.
+const OF_SHORTEST: f64 = 1.05;
+/// Largest overshoot, in percent of the step.
+pub const OVERSHOOT_PERCENT: f64 = 2.0;
+
+/// One effect over all its seeds and all steps upward, with a sensor.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Cause of the effect; `None` for the paper's spring.
+    pub cause: Option<Cause>,
+    /// Of the steps that a voltage can bring to 97 %, the one that exceeds what is allowed by most.
+    pub slowest: Step,
+    /// Steps that keep the time, those that a voltage can bring to 97 %, and all.
+    pub in_time: [usize; 3],
+    /// Largest overshoot, in percent of the step.
+    pub overshoot_percent: f64,
+}
+
+/// Times of a step, in s; infinite if 97 % are not reached before the next one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Time after which the true stiffness stays above 97 %.
+    pub t97_s: f64,
+    /// Time after which it can be at 97 %.
+    pub shortest_s: f64,
+}
+
+impl Step {
+    /// Time that is allowed, in s.
+    pub fn allowed_s(self) -> f64 {
+        WITHIN_S.max(OF_SHORTEST * self.shortest_s)
+    }
+}
+
+/// Runs the paper's spring and every effect.
+///
+/// # Errors
+/// The model rejects the settings.
+pub fn all(settings: &Settings, seeds: u64, first_seed: u64) -> Result<Vec<Outcome>, OutOfRange> {
+    let causes: Vec<_> = std::iter::once(None).chain(Cause::ALL.map(Some)).collect();
+    causes.par_iter().map(|&cause| one(settings, cause, first_seed..first_seed + seeds)).collect()
+}
+
+fn one(settings: &Settings, cause: Option<Cause>, seeds: Range<u64>) -> Result<Outcome, OutOfRange> {
+    let (mut steps, mut overshoot_percent) = (Vec::new(), 0.0);
+    for seed in seeds {
+        let scenario = cause.map_or_else(|| Scenario::nothing(seed), |cause| Scenario::of(cause, seed));
+        let ticks = (HOLD_S * settings.rate_hz).round() as usize;
+        let mut shortest = Vec::new();
+        let run = scenario.run_watched(
+            settings,
+            |_, read| fresh(read),
+            |tick, live| {
+                if tick % ticks == 0 {
+                    let (from, to) = heights(tick / ticks);
+                    shortest.push(shortest_s(
+                        live,
+                        settings.amplifier.max_v,
+                        from + 0.97 * (to - from),
+                        settings.rate_hz,
+                    ));
+                }
+            },
+        )?;
+        let truth: Vec<f64> = run.iter().map(|sample| sample.truth).collect();
+        for (number, (part, shortest_s)) in truth.chunks(ticks).zip(shortest).enumerate() {
+            let (from, to) = heights(number);
+            if to > from {
+                let reached = |y: &f64| (y - from) / (to - from) >= 0.97;
+                let late = part.iter().rposition(|y| !reached(y)).map_or(0, |tick| tick + 1);
+                let t97_s = if late == part.len() { f64::INFINITY } else { late as f64 / settings.rate_hz };
+                steps.push(Step { t97_s, shortest_s });
+            }
+        }
+        let up = stair::steps(&truth, settings.rate_hz).into_iter().filter(|step| step.up);
+        overshoot_percent = up.map(|step| step.overshoot_percent).fold(overshoot_percent, f64::max);
+    }
+    let late = |step: &Step| if step.t97_s.is_infinite() { f64::INFINITY } else { step.t97_s / step.allowed_s() };
+    let possible = || steps.iter().filter(|step| step.shortest_s.is_finite());
+    let slowest = possible().copied().max_by(|a, b| late(a).total_cmp(&late(b)));
+    let slowest = slowest.unwrap_or(Step { t97_s: f64::INFINITY, shortest_s: f64::INFINITY });
+    let kept = possible().filter(|step| step.t97_s <= step.allowed_s()).count();
+    let in_time = [kept, possible().count(), steps.len()];
+    Ok(Outcome { cause, slowest, in_time, overshoot_percent })
+}
+
+/// Targets before and after the step with this number, in V.
+fn heights(number: usize) -> (f64, f64) {
+    let level = |at: usize| LEVELS_V.get(at).copied().unwrap_or_default();
+    (number.checked_sub(1).map_or(0.0, level), level(number))
+}
+
+/// Time after which the spring is at `stiffness_v` under a constant voltage, in s.
+fn shortest_s(spring: &Live, voltage_v: f64, stiffness_v: f64, rate_hz: f64) -> f64 {
+    let mut spring = spring.clone();
+    spring.command(voltage_v);
+    let ticks = (0..(HOLD_S * rate_hz) as u32).find(|_| {
+        let there = spring.stiffness() >= stiffness_v;
+        spring.pass(1.0 / rate_hz);
+        there
+    });
+    ticks.map_or(f64::INFINITY, |ticks| f64::from(ticks) / rate_hz)
+}
+
+/// Table with one row for each effect.
+pub fn page(outcomes: &[Outcome]) -> String {
+    let time = |time_s: f64| if time_s.is_finite() { format!("{time_s:.3}") } else { "-".to_owned() };
+    let row = |it: &Outcome| {
+        vec![
+            it.cause.map_or("none", Cause::name).to_owned(),
+            time(it.slowest.t97_s),
+            time(it.slowest.shortest_s),
+            format!("{} of {}", it.in_time[0], it.in_time[1]),
+            (it.in_time[2] - it.in_time[1]).to_string(),
+            format!("{:.1}", it.overshoot_percent),
+        ]
+    };
+    let header = [
+        "effect",
+        "t97 of the slowest step [s]",
+        "shortest possible [s]",
+        "steps in time",
+        "impossible",
+        "overshoot [%]",
+    ];
+    table(&header, outcomes.iter().map(row))
+}
+
+/// Both criteria of each effect.
+pub fn criteria(controller: &str, outcomes: &[Outcome]) -> Vec<Criterion> {
+    let of = |it: &Outcome| {
+        let name = it.cause.map_or("none", Cause::name);
+        let (time, overshoot) =
+            (format!("{controller}, {name}: t97 [s]"), format!("{controller}, {name}: overshoot [%]"));
+        let allowed_s = (it.slowest.allowed_s() * 1000.0).round() / 1000.0;
+        [
+            Criterion::at_most(time, allowed_s, it.slowest.t97_s),
+            Criterion::at_most(overshoot, OVERSHOOT_PERCENT, it.overshoot_percent),
+        ]
+    };
+    outcomes.iter().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::{Amplifier, Compensation, Feedback, Margin};
+
+    fn robust() -> Settings {
+        let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02 };
+        Settings {
+            compensation: Compensation::Robust(margin),
+            amplifier: Amplifier::up_to(1000.0),
+            feedback: Some(Feedback::TYPICAL),
+            ..Settings::PAPER
+        }
+    }
+
+    /// The last step of the paper's spring from 400 to 500 V takes 0.446 s, and is the slowest.
+    #[test]
+    fn the_papers_spring_meets_the_requirement_at_the_shortest_possible_time() {
+        let Outcome { slowest, in_time, overshoot_percent, .. } = one(&robust(), None, 1..2).unwrap();
+        assert!((slowest.shortest_s - 0.446).abs() < 0.003, "{slowest:?}");
+        assert!(slowest.t97_s >= slowest.shortest_s && slowest.t97_s < 1.05 * slowest.shortest_s, "{slowest:?}");
+        assert!(in_time == [5, 5, 5] && overshoot_percent < OVERSHOOT_PERCENT, "{in_time:?} {overshoot_percent}");
+        assert!(criteria("it", &[one(&robust(), None, 1..2).unwrap()]).iter().all(Criterion::is_met));
+    }
+
+    /// An amplifier that stops short of 500 V cannot bring the spring there.
+    #[test]
+    fn a_step_that_no_voltage_completes_is_impossible() {
+        let [kept, possible, all] = one(&robust(), Some(Cause::AmplifierLimit), 1..2).unwrap().in_time;
+        assert!(kept <= possible && possible < 5 && all == 5, "{kept} {possible}");
+    }
+
+    /// A time constant that is far from what the margin allows.
+    #[test]
+    fn a_step_that_is_late_or_overshoots_does_not_meet_the_requirement() {
+        let late = Step { t97_s: 0.7, shortest_s: 0.5 };
+        let outcome =
+            |slowest, overshoot_percent| Outcome { cause: None, slowest, in_time: [4, 5, 5], overshoot_percent };
+        let met = |outcome| criteria("it", &[outcome]).iter().map(Criterion::is_met).collect::<Vec<_>>();
+        assert_eq!(met(outcome(late, 2.5)), [false, false]);
+        assert_eq!(met(outcome(Step { shortest_s: 0.67, ..late }, 2.0)), [true, true]);
+    }
+}
