@@ -75,6 +75,22 @@ fn curve_away_from_zero_is_named_alone() {
     assert!((tau_s / 6.0 - 1.0).abs() < 0.1, "{tau_s} s");
 }
 
+/// Rows that were not diagnosed are predicted with zero, gain, curve and lag of those that were.
+#[test]
+fn rows_that_were_not_diagnosed_are_predicted() {
+    let curve = |voltage: f64| 7.0 + 3.0 * ((voltage - 16.0) / 2.5).tanh();
+    let whole = record(curve, &[6.0], 0.02);
+    let rows = 800;
+    let (diagnosis, linear) = diagnosed(Record { rows: whole.rows[..rows].to_vec(), ..whole.clone() });
+    let errors = diagnosis.errors_on(&whole, Input::Hold);
+    assert_eq!(errors.len(), ROWS);
+    let rms = |errors: &[f64]| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+    let (seen, rest) = (rms(&errors[..rows]), rms(&errors[rows..]));
+    let extended = diagnosis.report.extended.quality.rmse;
+    assert!((seen / extended - 1.0).abs() < 0.05, "{seen} {extended}");
+    assert!(rest < 1.5 * extended && rest < 0.6 * linear, "{rest} {extended} {linear}");
+}
+
 /// Nothing is left to name where a linear model describes the record, and the extended simulation is the identified one.
 #[test]
 fn linear_spring_is_consistent_with_what_was_identified() {

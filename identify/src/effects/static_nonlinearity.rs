@@ -63,6 +63,8 @@ const INITIAL_SLOPES: [f64; 2] = [0.5, 1.5];
 /// Fraction of the rows with each sign of the voltage from which a curve for both signs can be found.
 const ROWS_OF_SIGN: f64 = 0.1;
 
+/// Part of the range over which the slope at its end is taken.
+const END_STEP: f64 = 1e-3;
 /// Number of points of the curve that are reported.
 const POINTS: u32 = 5;
 /// Number of intervals of the full scale in which levels of the voltage are counted.
@@ -113,6 +115,12 @@ fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
     let reference_v = if data.origin_v == 0.0 { REFERENCE_VOLTAGE_V } else { range_v };
     let voltage = if matches!(FORMS[form].0, Uneven) { voltage } else { voltage.abs() };
     FORMS[form].0.secant(point, voltage / range_v, reference_v / range_v)
+}
+
+/// Returns the slope of a curve just inside of the end of its range, both from the curve's origin.
+fn end_slope(curve: &impl Fn(f64) -> f64, end: f64) -> f64 {
+    let before = end * (1.0 - END_STEP);
+    (curve(end) - curve(before)) / (end - before)
 }
 
 /// Returns the number of levels of the voltage other than the curve's origin at which the record has rows.
@@ -235,9 +243,14 @@ impl Effect for StaticNonlinearity {
         let gain = chain.gain;
         let law = if FORMS[form].1 { &mut chain.law_behind } else { &mut chain.law };
         let origin = gain * data.origin_v;
+        let range_v = gain * range_v(data);
+        let value = move |above: f64| above * secant(form, point, above / gain, data);
         law.push(move |voltage| {
             let above = voltage - origin;
-            origin + above * secant(form, point, above / gain, data)
+            // Beyond the record's range, where nothing shows it, the curve keeps its end slope.
+            let within = above.max(-range_v).min(range_v);
+            let beyond = if above == within { 0.0 } else { end_slope(&value, within) * (above - within) };
+            origin + value(within) + beyond
         });
     }
 }

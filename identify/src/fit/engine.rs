@@ -200,8 +200,18 @@ impl<'a> Engine<'a> {
         self.residual_and_start(model).0
     }
 
-    /// Returns the same, and the cost of that initial state in nats.
+    /// Returns the same with all that is estimated for each model, such as the initial state, estimated from the first `rows` rows.
+    pub fn residual_by_first(&mut self, rows: usize, model: &Model) -> Vec<f64> {
+        self.residual_and_start_by(model, |row| row < rows).0
+    }
+
+    /// Returns the residual, and the cost of the initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
+        self.residual_and_start_by(model, |_| true)
+    }
+
+    /// Returns the same with an initial state that is estimated from the rows that `counts` selects.
+    fn residual_and_start_by(&mut self, model: &Model, counts: impl Fn(usize) -> bool) -> (Vec<f64>, f64) {
         let estimated = self.data.has_nuisances();
         if estimated {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
@@ -211,7 +221,7 @@ impl<'a> Engine<'a> {
         let truncation_v = self.observed.truncation_v;
         let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
-        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        let exact = |row: usize| counts(row) && self.observed.kinds[row] == Kind::Exact;
         let initial_state_cost = match estimated {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
@@ -478,7 +488,7 @@ impl<'a> Engine<'a> {
         let full_scale_v = self.data.full_scale_v;
         let start = self.held_start(model).filter(|_| self.data.normalisation.identified)?;
         let &[.., zero_v, gain_v] = start.estimate.start_v.as_slice() else { return None };
-        Some([zero_v, 1.0 + gain_v / full_scale_v])
+        Some([zero_v, 1.0 + gain_v / full_scale_v]).filter(|[zero_v, gain]| zero_v.is_finite() && gain.is_normal())
     }
 
     /// Returns reading minus prediction of each row, in V, from a given initial state.

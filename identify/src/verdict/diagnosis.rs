@@ -145,7 +145,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect).into_iter().unzip(),
     };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
-    let export = export(engine, &found.model().clone(), held);
+    let reading_map = engine.reading_map(found.model());
+    let export = export(engine, found.model(), reading_map, held);
 
     let report = Report {
         schema: SCHEMA,

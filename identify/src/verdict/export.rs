@@ -35,11 +35,11 @@ pub struct Export {
     pub tick_refuses: Option<String>,
 }
 
-/// Exports a fitted model; `held` says that the record's voltage is held between rows.
-pub(crate) fn export(engine: &mut Engine, model: &Model, held: bool) -> Export {
+/// Exports a fitted model, under which the reading may have a zero and a gain relative to the nominal ones; `held` says that the record's voltage is held between rows.
+pub(crate) fn export(engine: &Engine, model: &Model, reading_map: Option<[f64; 2]>, held: bool) -> Export {
     let (data, base) = (engine.data, engine.base());
     let mut file = restored(engine, &model.extend(base, data));
-    if let Some([zero_v, gain]) = engine.reading_map(model) {
+    if let Some([zero_v, gain]) = reading_map {
         let nominal = file.reading.unwrap_or_default();
         file.reading = Some(Reading { gain: gain * nominal.gain, zero: nominal.zero + data.scales().reading * zero_v });
     }

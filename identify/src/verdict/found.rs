@@ -10,6 +10,9 @@ use crate::verdict::alternatives::rivals;
 use crate::verdict::cause::Cause;
 use crate::verdict::ranking;
 
+/// Ratio of the held-out errors up to which the relaxation stays as it was identified.
+const AS_GOOD: f64 = 1.02;
+
 /// A finished search.
 pub(crate) struct Found {
     /// The best structure.
@@ -54,10 +57,18 @@ pub(crate) fn search(
         let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
         best = search.predicting(best, is_larger, held_out);
     }
-    // An identified spring is the best without causes, and causes under which it predicts worse are none.
+    // An identified spring is the best without causes, stays as it is if the causes need no other, and causes under which it predicts
+    // worse are none.
     if search.evaluator().data.normalisation.identified {
-        let held_out = error(&search.evaluator().held_out_residual(&best.fit));
-        if best.fit.model.blocks.is_empty() || held_out > error(&baseline.residual) {
+        let engine = search.evaluator();
+        let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
+        let as_identified = engine.fit_twice(Model { relaxation: Vec::new(), ..best.fit.model.clone() });
+        let moved = held_out(engine, &best.fit);
+        let kept = held_out(engine, &as_identified);
+        if kept <= AS_GOOD * moved {
+            best.fit = as_identified;
+        }
+        if best.fit.model.blocks.is_empty() || kept.min(moved) > error(&baseline.residual) {
             best = Scored { fit: baseline.clone(), ..search.root() };
         }
     }

@@ -12,6 +12,7 @@
 //! | suspect | a cause that comes close to a finding but is none |
 //! | ranking | the best sets of causes compared by score and held-out error |
 //! | hypotheses | the best sets with their fits, and the experiment: what the next experiment is computed from |
+//! | further rows | the errors of the extended simulation beyond the rows that were diagnosed |
 //! | restored | converted from the coordinates of the search to the file's units |
 //!
 //! [`diagnosis`] puts the parts together.
@@ -25,6 +26,7 @@ mod extrapolation;
 pub mod finding;
 mod form_average;
 pub(crate) mod found;
+mod further_rows;
 pub(crate) mod held_findings;
 pub(crate) mod hypotheses;
 pub(crate) mod linear_rival;

@@ -10,6 +10,7 @@ use identify::fit::engine::Engine;
 use identify::plan::{Basis, Request, plan};
 use identify::plant::base::Base;
 use identify::record::data::Data;
+use identify::record::normalisation::Normalisation;
 use identify::record::observed::Observed;
 use identify::stats::scale::root_mean_square;
 #[cfg(feature = "sensitivity")]
@@ -155,8 +156,20 @@ pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3
 /// The record is rejected.
 pub fn residuals_beyond(record: &Record, rows: usize, options: &Options) -> Result<[Vec<f64>; 2]> {
     let identified = examine(&first(record, rows), options, |_| ())?;
-    let beyond = |model: &Model| residual_of(model, record, options, &identified).split_off(identified.data.rows());
-    Ok([&Model::default(), &identified.extended.model].map(beyond))
+    let nominal = nominal_errors(record, &first(record, rows), options);
+    let rows = identified.data.rows();
+    Ok([nominal, identified.errors_on(record, options.input)].map(|mut errors| errors.split_off(rows)))
+}
+
+/// Readings less predictions of a record by the nominal spring as it is, in the reading's unit; the coordinates are those of the first
+/// rows.
+fn nominal_errors(record: &Record, first: &Record, options: &Options) -> Vec<f64> {
+    let mut normalisation = Normalisation::of(first, options.base.file(), options.input, options.units.clone());
+    normalisation.unsettled = options.unsettled;
+    let data = Data::thinned(&normalisation.record(record), options.input, 1, &normalisation);
+    let (observed, base) = (Observed::new(&data), options.base.normalised(&normalisation));
+    let residual = Engine::new(&data, &observed, &base).residual(&Model::default());
+    residual.into_iter().map(|left| normalisation.scales.reading * left).collect()
 }
 
 /// The first rows of a record.
@@ -167,17 +180,5 @@ fn first(record: &Record, rows: usize) -> Record {
 /// Readings less predictions of a whole record by the model identified on its first `rows` rows, and the diagnosis of these.
 fn residual(record: &Record, rows: usize, options: &Options) -> Result<(Vec<f64>, Diagnosis)> {
     let identified = examine(&first(record, rows), options, |_| ())?;
-    Ok((residual_of(&identified.extended.model, record, options, &identified), identified))
-}
-
-/// Readings less predictions of a whole record by a model of the diagnosis of its first rows.
-fn residual_of(model: &Model, record: &Record, options: &Options, identified: &Diagnosis) -> Vec<f64> {
-    let normalisation = &identified.data.normalisation;
-    let data = Data::thinned(&normalisation.record(record), options.input, 1, normalisation);
-    // Some parameters of the model are relative to the full scale of the record that it was identified on.
-    let full_scale_v = identified.data.full_scale_v / normalisation.scales.volt_v;
-    let data = Data { full_scale_v, ..data };
-    let (observed, base) = (Observed::new(&data), options.base.normalised(normalisation));
-    let residual = Engine::new(&data, &observed, &base).residual(model);
-    residual.into_iter().map(|left| normalisation.scales.reading * left).collect()
+    Ok((identified.errors_on(record, options.input), identified))
 }
