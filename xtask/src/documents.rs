@@ -70,7 +70,7 @@ fn whole(page: &str) -> Vec<String> {
     lines
 }
 
-/// What is quoted in the sentences of a page and starts as a command does; a synopsis with brackets or dots is none.
+/// What is quoted in the sentences of a page and starts as a command does; a synopsis with brackets or dots does not count.
 fn quoted(page: &str) -> Vec<String> {
     let sentences: String = page.split("```").step_by(2).collect();
     let quoted =

@@ -1,12 +1,10 @@
 //! A first-order low-pass filter, solved exactly for straight pieces of its input.
 
-use crate::record::signal::piecewise::{Piece, Signal};
+use crate::record::signal::piecewise::{Piece, SAME_DURATION, Signal};
 
 /// Added to states so that they do not decay to subnormal numbers, with which processors are slow; far below the resolution of
 /// any other value.
 pub(super) const NO_SUBNORMAL: f64 = 1e-290;
-/// Relative difference up to which durations of pieces are the same: those of a uniformly sampled record differ by rounding.
-pub(super) const SAME_DURATION: f64 = 1e-9;
 
 /// A first-order low-pass filter of unit gain, `tau dx/dt = u - x`, exact for straight pieces of the input `u`.
 #[derive(Clone, Copy, Debug)]

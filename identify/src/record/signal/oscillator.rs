@@ -1,7 +1,7 @@
 //! A second-order low-pass filter, solved exactly for straight pieces of its input.
 
-use crate::record::signal::lag::{NO_SUBNORMAL, SAME_DURATION};
-use crate::record::signal::piecewise::Piece;
+use crate::record::signal::lag::NO_SUBNORMAL;
+use crate::record::signal::piecewise::{Piece, SAME_DURATION};
 
 /// An underdamped second-order low-pass filter of unit gain, `x'' / w^2 + 2 zeta x' / w + x = u`, exact for straight pieces of the
 /// input `u`.

@@ -1,9 +1,10 @@
 //! A signal of straight pieces with jumps between them, and the blocks that map one such signal to another.
 
-use crate::record::signal::lag::SAME_DURATION;
-
 /// Durations up to this, in s, are rounding errors.
 const ROUNDING_S: f64 = 1e-9;
+
+/// Relative difference up to which durations of pieces are the same: those of a uniformly sampled record differ by rounding.
+pub(super) const SAME_DURATION: f64 = 1e-9;
 
 /// One straight piece of a signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
