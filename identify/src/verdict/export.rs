@@ -35,7 +35,8 @@ pub struct Export {
     pub tick_refuses: Option<String>,
 }
 
-/// Exports a fitted model, under which the reading may have a zero and a gain relative to the nominal ones; `held` says that the record's voltage is held between rows.
+/// Exports a fitted model, under which the reading may have a zero and a gain relative to the nominal ones; `held` says that the record's
+/// voltage is held between rows.
 pub(crate) fn export(engine: &Engine, model: &Model, reading_map: Option<[f64; 2]>, held: bool) -> Export {
     let (data, base) = (engine.data, engine.base());
     let mut file = restored(engine, &model.extend(base, data));

@@ -96,9 +96,8 @@ fn rival(engine: &mut Engine, fit: &Fit, nats: f64) -> Rival {
     // The coordinates of an identified relaxation, behind those of all blocks, stay as they are in the plan.
     let fitted = fit.model.blocks.iter().flat_map(|(block, _)| block.coordinates(engine.data));
     let fitted = fitted.filter(|coordinate| coordinate.fitted).count();
-    let row = |row: &[f64]| row[..fitted].to_vec();
     let covariance = interval::covariance(engine, fit).map_or_else(Vec::new, |matrix| {
-        matrix.row_iter().take(fitted).map(|of| row(&of.iter().copied().collect::<Vec<f64>>())).collect()
+        matrix.row_iter().take(fitted).map(|row| row.iter().take(fitted).copied().collect()).collect()
     });
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     let mut parameters_of = |effect: usize| {
