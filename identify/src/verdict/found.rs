@@ -63,12 +63,12 @@ pub(crate) fn search(
         let engine = search.evaluator();
         let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
         let as_identified = engine.fit_twice(Model { relaxation: Vec::new(), ..best.fit.model.clone() });
-        let moved = held_out(engine, &best.fit);
+        let mut predicted = held_out(engine, &best.fit);
         let kept = held_out(engine, &as_identified);
-        if kept <= AS_GOOD * moved {
-            best.fit = as_identified;
+        if kept <= AS_GOOD * predicted {
+            (best.fit, predicted) = (as_identified, kept);
         }
-        if best.fit.model.blocks.is_empty() || kept.min(moved) > error(&baseline.residual) {
+        if best.fit.model.blocks.is_empty() || predicted > error(&baseline.residual) {
             best = Scored { fit: baseline.clone(), ..search.root() };
         }
     }
