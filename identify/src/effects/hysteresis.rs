@@ -87,8 +87,8 @@ impl Effect for Hysteresis {
         coordinates
     }
 
-    /// The play behind the relaxation and the friction under load are not tried with an unknown initial state, in which their
-    /// predictions are not linear.
+    /// The play behind the relaxation and the friction under load have no initial condition that is estimated: they are not tried where
+    /// it is unknown.
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         if matches!(form, BEHIND | LOAD) && data.initial_state_unknown {
             return Vec::new();

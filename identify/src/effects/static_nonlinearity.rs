@@ -179,12 +179,11 @@ impl Effect for StaticNonlinearity {
         }
     }
 
-    /// A curve needs one level of the voltage more than it has parameters. Forms behind the relaxation are not tried with an
-    /// unknown initial state, in which their prediction is not linear.
+    /// A curve needs one level of the voltage more than it has parameters.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         let (curve, behind) = FORMS[form];
         let levels = levels(context.data);
-        let unknown = behind && context.data.initial_state_unknown;
+        let unknown = behind && !context.data.estimates_any_start();
         if levels <= curve.coefficients() || unknown || matches!(curve, Uneven) && !has_both_signs(context.data) {
             return Vec::new();
         }

@@ -58,10 +58,8 @@ impl Effect for VoltageDependentTimeConstant {
         coordinates
     }
 
-    /// Forms that depend on the state or the direction are not tried with an unknown initial state, in which their prediction is not
-    /// linear.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
-        if (form == BY_DIRECTION || by_state(form)) && context.data.initial_state_unknown {
+        if (form == BY_DIRECTION || by_state(form)) && !context.data.estimates_any_start() {
             return Vec::new();
         }
         let start = |(low, high): (f64, f64)| {

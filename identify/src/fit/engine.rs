@@ -12,9 +12,10 @@ use crate::fit::budget::{Budget, UNLIMITED};
 use crate::fit::known::Known;
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
+use crate::fit::start::Start;
 use crate::noise::{Noise, Term};
 use crate::plant::base::Base;
-use crate::plant::initial_state::{self, Estimate};
+use crate::plant::initial_state;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
@@ -51,11 +52,11 @@ impl Fit {
 }
 
 /// Work for each row, in units of one piece of the voltage through one lag.
-mod work {
+pub(super) mod work {
     /// The difference between reading and prediction.
-    pub(super) const RESIDUAL: u64 = 1;
+    pub(in crate::fit) const RESIDUAL: u64 = 1;
     /// The estimate of one initial state.
-    pub(super) const INITIAL_STATE: u64 = 6;
+    pub(in crate::fit) const INITIAL_STATE: u64 = 6;
     /// What one initial state takes over of a change.
     pub(super) const FOLLOWING: u64 = 1;
     /// The scale of the noise and the likelihood.
@@ -88,14 +89,6 @@ pub struct Approach {
     pub log_likelihood: f64,
     /// True if a further round would gain nothing.
     pub settled: bool,
-}
-
-/// The unknown initial state of a record at a model.
-struct HeldStart {
-    estimate: Estimate,
-    kernels: Vec<Vec<f64>>,
-    /// Reading minus prediction from that state, in V.
-    residual: Vec<f64>,
 }
 
 /// Fits models to one record.
@@ -137,13 +130,13 @@ pub struct Engine<'a> {
     /// Properties of its readings.
     pub observed: &'a Observed,
     /// Runs the models.
-    simulator: Simulator<'a>,
+    pub(super) simulator: Simulator<'a>,
     /// Reading minus prediction of the plant without any effect, in V.
     pub baseline_residual: Vec<f64>,
-    predicted: Vec<f64>,
-    kernels: Vec<Vec<f64>>,
+    pub(super) predicted: Vec<f64>,
+    pub(super) kernels: Vec<Vec<f64>>,
     /// Work that fits may do, and that was done.
-    budget: &'a Budget,
+    pub(super) budget: &'a Budget,
     /// Causes that a search may add; `None` for all.
     candidates: Option<&'a [&'static str]>,
 }
@@ -222,6 +215,11 @@ impl<'a> Engine<'a> {
         let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
         let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
         let exact = |row: usize| counts(row) && self.observed.kinds[row] == Kind::Exact;
+        if estimated && !self.simulator.is_linear_in_start() {
+            let Some(Start { start_v, residual, .. }) = self.start_by(model, exact) else { return (residual, 0.0) };
+            let cost = initial_state::cost(&start_v, self.data.full_scale_v, residual.len());
+            return (residual, cost);
+        }
         let initial_state_cost = match estimated {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
@@ -240,14 +238,15 @@ impl<'a> Engine<'a> {
     /// Returns reading minus prediction of each row, in V, without an estimate of the initial state.
     pub fn residual_from_rest(&mut self, model: &Model) -> Vec<f64> {
         self.simulator.run(model, &mut self.predicted);
+        self.residual_of_predicted()
+    }
+
+    /// Returns reading minus what was predicted last, of each row, in V, and counts the work for it.
+    pub(super) fn residual_of_predicted(&mut self) -> Vec<f64> {
         self.budget.spend(self.simulator.take_work() + work::RESIDUAL * self.predicted.len() as u64);
         let truncation_v = self.observed.truncation_v;
-        self.data
-            .reading
-            .iter()
-            .zip(&self.predicted)
-            .map(|(reading, predicted)| reading + truncation_v - predicted)
-            .collect()
+        let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
+        self.data.reading.iter().zip(&self.predicted).map(left).collect()
     }
 
     /// Returns the change of the prediction, in V, for each initial state that is 1 V away from rest; empty if the spring was at
@@ -468,36 +467,6 @@ impl<'a> Engine<'a> {
         (0..residual.len()).map(|row| noise.term(self.observed.kinds[row], residual[row], white[row])).collect()
     }
 
-    /// Returns the initial state of a single record at a model, if it is unknown, and the residual from there.
-    fn held_start(&mut self, model: &Model) -> Option<HeldStart> {
-        if !self.data.has_nuisances() || self.data.is_joined() {
-            return None;
-        }
-        let forced = self.residual_from_rest(model);
-        let kernels = self.initial_states(model).to_vec();
-        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
-        let estimate = Estimate::of(&forced, &kernels, self.data.full_scale_v, exact)?;
-        self.budget.spend(work::INITIAL_STATE * (kernels.len() * forced.len()) as u64);
-        let residual = self.residual_from(model, &estimate.start_v);
-        Some(HeldStart { estimate, kernels, residual })
-    }
-
-    /// Returns zero, in V, and gain of the reading relative to those of the nominal spring at a model, if that was identified from the
-    /// same readings.
-    pub fn reading_map(&mut self, model: &Model) -> Option<[f64; 2]> {
-        let full_scale_v = self.data.full_scale_v;
-        let start = self.held_start(model).filter(|_| self.data.normalisation.identified)?;
-        let &[.., zero_v, gain_v] = start.estimate.start_v.as_slice() else { return None };
-        Some([zero_v, 1.0 + gain_v / full_scale_v]).filter(|[zero_v, gain]| zero_v.is_finite() && gain.is_normal())
-    }
-
-    /// Returns reading minus prediction of each row, in V, from a given initial state.
-    fn residual_from(&mut self, model: &Model, start_v: &[f64]) -> Vec<f64> {
-        self.simulator.run_from(model, start_v, &mut self.predicted);
-        self.budget.spend(self.simulator.take_work() + work::RESIDUAL * self.predicted.len() as u64);
-        self.data.reading.iter().zip(&self.predicted).map(|(reading, predicted)| reading - predicted).collect()
-    }
-
     /// Returns the derivatives of the prediction by forward differences, or backward differences at upper bounds. An unknown
     /// initial state follows with the weights and kernels that it has at the model (Kaufman's approximation of variable
     /// projection, BIT 15, 1975): one simulation for each column instead of one for each state of it as well.
@@ -524,8 +493,8 @@ impl<'a> Engine<'a> {
         let points = model.points();
         let places: Vec<usize> = wanted.filter(|&place| bounds[place].fitted).collect();
         let mut nudged = model.clone();
-        let held = self.held_start(model);
-        let residual = held.as_ref().map_or(residual, |held| &held.residual);
+        let start = self.start(model);
+        let residual = start.as_ref().map_or(residual, |start| &start.residual);
         let columns = places.iter().map(|&place| {
             if let Some(column) = known.column(coordinates[place]) {
                 return column.clone();
@@ -538,14 +507,14 @@ impl<'a> Engine<'a> {
             let mut moved = points.clone();
             moved[place] += step;
             nudged.set_points(&moved);
-            let there = match &held {
-                Some(held) => self.residual_from(&nudged, &held.estimate.start_v),
+            let there = match &start {
+                Some(start) => self.residual_from(&nudged, &start.start_v),
                 None => self.residual(&nudged),
             };
             let mut column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
-            if let Some(held) = &held {
-                held.estimate.follow(&mut column, &held.kernels);
-                self.budget.spend(held.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
+            if let Some(start) = &start {
+                start.estimate.follow(&mut column, &start.kernels);
+                self.budget.spend(start.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
             }
             // Rows that stopped at a bound are not whitened.
             let mut white = noise.whitened(&column);

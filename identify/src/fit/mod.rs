@@ -13,4 +13,5 @@ pub mod known;
 pub mod leave_one_out;
 pub mod normal_equations;
 pub mod simulator;
+mod start;
 pub mod stop;

@@ -28,6 +28,8 @@ pub struct Simulator<'a> {
     kernels: Cached<Vec<Vec<f64>>>,
     /// Index of the state of each of these kernels.
     states: Vec<usize>,
+    /// True if the response that was simulated last is linear in the initial state.
+    linear_in_start: bool,
     /// Simulators of several records, in their order; empty for a single one.
     parts: Vec<Simulator<'a>>,
     /// Work since it was counted last, in units of one piece through one lag.
@@ -100,6 +102,7 @@ impl<'a> Simulator<'a> {
             response: Cached::default(),
             kernels: Cached::default(),
             states: Vec::new(),
+            linear_in_start: true,
             parts: data.parts.iter().map(|part| Self::new(&part.data, base)).collect(),
             work: 0.0,
         }
@@ -185,6 +188,12 @@ impl<'a> Simulator<'a> {
         }
     }
 
+    /// Returns true if the response that was simulated last is linear in the initial state, so that its kernels are the same from every
+    /// one.
+    pub fn is_linear_in_start(&self) -> bool {
+        self.linear_in_start
+    }
+
     /// Returns the response of the stiffness to each initial state, of the model that was simulated last.
     fn initial_state_kernels(&mut self, model: &Model) -> &[Vec<f64>] {
         let chain = model.chain(self.base, self.data);
@@ -196,11 +205,10 @@ impl<'a> Simulator<'a> {
             let (mut state, mut states) = (0, 1);
             while state < states {
                 let mut start = InitialState::off(state);
-                self.free_response(model, &chain, &mut start);
+                let kernel = self.change(model, &chain, &mut start);
                 // A state that changes no row is not estimated.
-                if self.signal.at_rows().any(|value| value.abs() > LEAST_KERNEL) {
-                    let output = self.data.scales().output;
-                    self.kernels.value.push(self.signal.at_rows().map(|value| output * value).collect());
+                if kernel.iter().any(|value| value.abs() > LEAST_KERNEL) {
+                    self.kernels.value.push(kernel);
                     self.states.push(state);
                 }
                 (state, states) = (state + 1, start.states());
@@ -214,18 +222,12 @@ impl<'a> Simulator<'a> {
     pub fn run_from(&mut self, model: &Model, start_v: &[f64], readings: &mut Vec<f64>) {
         self.run(model, readings);
         readings.clone_from(&self.response.value);
-        let mut rest = start_v;
-        if self.data.initial_state_unknown {
-            let (states_v, others_v) = start_v.split_at(self.states.len());
-            let mut offsets_v = vec![0.0; self.states.last().map_or(0, |last| last + 1)];
-            self.states.iter().zip(states_v).for_each(|(&state, &offset_v)| offsets_v[state] = offset_v);
-            let chain = model.chain(self.base, self.data);
-            self.free_response(model, &chain, &mut InitialState::of(offsets_v));
-            let output = self.data.scales().output;
-            readings.iter_mut().zip(self.signal.at_rows()).for_each(|(reading, free)| *reading += output * free);
-            rest = others_v;
+        let (states_v, reading_map) = start_v.split_at(self.known_states());
+        if !states_v.is_empty() {
+            let change = self.change_by(model, states_v);
+            readings.iter_mut().zip(change).for_each(|(reading, change)| *reading += change);
         }
-        if let [zero_v, gain_v] = rest {
+        if let [zero_v, gain_v] = reading_map {
             let gain = gain_v / self.data.full_scale_v;
             let stiffness = self.response.value.iter();
             readings.iter_mut().zip(stiffness).for_each(|(reading, stiffness)| *reading += zero_v + gain * stiffness);
@@ -233,14 +235,51 @@ impl<'a> Simulator<'a> {
         self.modify_readings(model, readings);
     }
 
-    /// Sets `signal` to the response of the stiffness to an initial state, of the model that was simulated last.
-    fn free_response(&mut self, model: &Model, chain: &Chain, start: &mut InitialState) {
-        chain.initial_state_response(&self.amplified.value, &mut self.signal, start, &self.levels_v);
-        self.work += (1.0 + IRREGULAR * self.irregular) * INITIAL_STATE * self.signal.len() as f64;
+    /// Computes the kernels of the initial states at an initial state: the change of the prediction by 1 V more of each. `start_v` and
+    /// `kernels` hold those of zero and gain as well, which stay. Of a single record, in the model that was simulated last.
+    pub fn update_kernels(&mut self, model: &Model, start_v: &[f64], kernels: &mut [Vec<f64>]) {
+        let states = self.known_states();
+        let mut states_v = start_v[..states].to_vec();
+        let here = self.change_by(model, &states_v);
+        for (index, kernel) in kernels[..states].iter_mut().enumerate() {
+            states_v[index] += 1.0;
+            *kernel = self.change_by(model, &states_v);
+            kernel.iter_mut().zip(&here).for_each(|(there, here)| *there -= here);
+            states_v[index] = start_v[index];
+        }
+    }
+
+    /// Returns the number of initial states that had a kernel when these were computed last.
+    fn known_states(&self) -> usize {
+        if self.data.initial_state_unknown { self.states.len() } else { 0 }
+    }
+
+    /// Returns the change of the prediction at each row, in V, by an offset of each known state, in V.
+    fn change_by(&mut self, model: &Model, states_v: &[f64]) -> Vec<f64> {
+        let mut offsets_v = vec![0.0; self.states.last().map_or(0, |last| last + 1)];
+        self.states.iter().zip(states_v).for_each(|(&state, &offset_v)| offsets_v[state] = offset_v);
+        let chain = model.chain(self.base, self.data);
+        self.change(model, &chain, &mut InitialState::of(offsets_v))
+    }
+
+    /// Returns the change of the prediction at each row by an initial state, in V, of the model that was simulated last.
+    fn change(&mut self, model: &Model, chain: &Chain, start: &mut InitialState) -> Vec<f64> {
+        let linear = chain.is_linear_in_start();
+        if linear {
+            chain.initial_state_response(&self.amplified.value, &mut self.signal, start, &self.levels_v);
+            self.work += (1.0 + IRREGULAR * self.irregular) * INITIAL_STATE * self.signal.len() as f64;
+        } else {
+            self.signal.clone_from(&self.static_response.value);
+            chain.relax(&mut self.signal, &self.amplified.value, start, &mut self.levels_v);
+            self.work += chain.work(&self.signal, self.irregular);
+        }
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, start);
             self.work += response_work(*block, &self.signal, self.irregular);
         }
+        let output = self.data.scales().output;
+        let changed = self.signal.at_rows().map(|stiffness| output * stiffness);
+        if linear { changed.collect() } else { changed.zip(&self.response.value).map(|(to, from)| to - from).collect() }
     }
 
     /// Returns the stiffness for the command, with the effects on the chain and on the stiffness.
@@ -262,7 +301,8 @@ impl<'a> Simulator<'a> {
                 self.work += STATIC_RESPONSE * self.static_response.value.len() as f64;
             }
             signal.clone_from(&self.static_response.value);
-            chain.relax(signal, &self.amplified.value, &mut self.levels_v);
+            chain.relax(signal, &self.amplified.value, &mut InitialState::at_rest(), &mut self.levels_v);
+            self.linear_in_start = chain.is_linear_in_start();
             self.work += chain.work(signal, self.irregular);
         }
         if model.blocks.iter().all(|(block, _)| block.affects() != Affects::Response) {

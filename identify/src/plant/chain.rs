@@ -21,7 +21,7 @@ use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
 use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
-use crate::record::signal::{Lag, Signal};
+use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
 /// All blocks between the command and the stiffness that effects can modify.
@@ -134,6 +134,15 @@ impl<'a> Chain<'a> {
         self.memory.table().is_some() || self.relaxation.varies() || self.relaxation.falling_tau_s.is_some()
     }
 
+    /// Returns true if the stiffness is linear in the initial state: not where a law, a play operator or the time constant depends on
+    /// the state.
+    pub fn is_linear_in_start(&self) -> bool {
+        let relaxation = &self.relaxation;
+        let by_state = relaxation.varies() && relaxation.by_state.is_some();
+        let linear_relaxation = !by_state && relaxation.falling_tau_s.is_none();
+        linear_relaxation && self.law_behind.is_identity() && self.memory_behind.table().is_none()
+    }
+
     /// Returns the work of the linear part on a signal, in units of one lag; `irregular` is the fraction of its pieces that are not as
     /// long as the one before them.
     pub fn work(&self, signal: &Signal, irregular: f64) -> f64 {
@@ -186,13 +195,14 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Maps the settled stiffness to the stiffness. `applied` is the voltage on the electrodes; `levels_v` receives its
-    /// value in the middle of each piece if the time constant depends on the voltage.
-    pub fn relax(&self, signal: &mut Signal, applied: &Signal, levels_v: &mut Vec<f64>) {
+    /// Maps the settled stiffness to the stiffness, from an initial state. `applied` is the voltage on the electrodes; `levels_v`
+    /// receives its value in the middle of each piece if the time constant depends on the voltage.
+    pub fn relax(&self, signal: &mut Signal, applied: &Signal, start: &mut InitialState, levels_v: &mut Vec<f64>) {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
-        self.follow(signal, &mut InitialState::at_rest(), levels_v);
+        self.add_from_before(applied, signal, start);
+        self.follow(signal, start, levels_v);
         if self.memory_behind.table().is_some() {
             let mut memory = self.memory_behind.clone();
             signal.map(|stiffness| memory.at(stiffness));
@@ -242,9 +252,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Replaces `signal` by the response of the stiffness to the initial state, where `applied` is the voltage on the electrodes:
-    /// voltages sent before the first row that arrive delayed, play operators as the largest voltage leaves them, and
-    /// the states of the lags.
+    /// Replaces `signal` by the response of the stiffness to the initial state, where `applied` is the voltage on the electrodes, of a
+    /// chain that is [linear](Chain::is_linear_in_start) in it.
     pub fn initial_state_response(
         &self,
         applied: &Signal,
@@ -252,6 +261,14 @@ impl<'a> Chain<'a> {
         start: &mut InitialState,
         levels_v: &[f64],
     ) {
+        signal.silence_as(applied);
+        self.add_from_before(applied, signal, start);
+        self.follow(signal, start, levels_v);
+    }
+
+    /// Adds to the settled stiffness what is left from the time before the first row: voltages that arrive delayed, and play operators
+    /// as the largest voltage leaves them.
+    fn add_from_before(&self, applied: &Signal, signal: &mut Signal, start: &mut InitialState) {
         let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
         let late = if self.delay_s > 0.0 {
             [0.0; DELAY_INTERVALS].map(|_| start.next_offset_v())
@@ -266,21 +283,20 @@ impl<'a> Chain<'a> {
             0.0 => 0.0,
             _ => kept * (self.law.at(above.at(voltage)) - self.law.at(rest.at(voltage))),
         };
-        signal.silence_as(applied);
         if output.value() != 0.0 || kept != 0.0 || late != [0.0; DELAY_INTERVALS] {
             let (mut at_s, mut voltages) = (0.0, applied.pieces().iter());
             signal.pass(|piece| {
                 let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
                 at_s += piece.duration_s;
                 if kept == 0.0 && output.value() == 0.0 && at_s > 2.0 * self.delay_s {
-                    return (0.0, 0.0);
+                    return (piece.from, piece.to);
                 }
                 let sent = late.get(part as usize).copied().unwrap_or(0.0);
-                let (from, to) = if output.value() == 0.0 { (0.0, 0.0) } else { output.pass(piece) };
+                let silent = Piece { from: 0.0, to: 0.0, ..piece };
+                let (from, to) = if output.value() == 0.0 { (0.0, 0.0) } else { output.pass(silent) };
                 let voltage = voltages.next().expect("as many pieces");
-                (from + sent + apart(voltage.from), to + sent + apart(voltage.to))
+                (piece.from + from + sent + apart(voltage.from), piece.to + to + sent + apart(voltage.to))
             });
         }
-        self.follow(signal, start, levels_v);
     }
 }

@@ -1,10 +1,11 @@
 //! The initial state of the chain at the first row, where the spring may not have been at rest.
 //!
-//! Behind hysteresis and static law the chain is linear, except for two forms of effects that are not tried in this
-//! case (a time constant that depends on the state, and a law behind the relaxation). So the prediction is linear in
-//! the states at the first row, `prediction(x) = prediction(0) + sum x_i kernel_i`, and the kernels decay. The states
+//! Behind hysteresis and static law most chains are linear, so that the prediction is linear in the states at the first
+//! row, `prediction(x) = prediction(0) + sum x_i kernel_i`, and the kernels decay. The states
 //! are not coordinates of the fit: for every model they are estimated by Huber's robust least squares, with a normal
-//! prior whose width is the record's full scale (the prior decides between kernels of the same shape). Held-out
+//! prior whose width is the record's full scale (the prior decides between kernels of the same shape). Where a law, a play
+//! operator or the time constant depends on the state, the estimate takes Gauss-Newton steps, with the kernels where
+//! the first one ended. Held-out
 //! segments use the same estimate. The likelihood is reduced by the cost of the states, by Schwarz's criterion.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -119,8 +120,7 @@ impl Estimate {
 }
 
 /// Subtracts the response to the most likely initial state from a residual, estimated from the rows for which `counts`
-/// is true, with a prior of standard deviation `reach_v`, in V. Returns the cost in nats: Schwarz's criterion for each
-/// state, and the prior.
+/// is true, with a prior of standard deviation `reach_v`, in V. Returns its [cost], in nats.
 pub(crate) fn subtract_estimate(
     residual: &mut [f64],
     kernels: &[Vec<f64>],
@@ -129,7 +129,13 @@ pub(crate) fn subtract_estimate(
 ) -> f64 {
     let Some(Estimate { start_v, .. }) = Estimate::of(residual, kernels, reach_v, counts) else { return 0.0 };
     subtract(&start_v, kernels, residual);
-    0.5 * (residual.len().max(2) as f64).ln() * kernels.len() as f64 + 0.5 * dot(&start_v, &start_v) / reach_v.powi(2)
+    cost(&start_v, reach_v, residual.len())
+}
+
+/// Returns the cost of an initial state that was estimated from a number of rows, in nats: Schwarz's criterion for each state, and the
+/// prior of standard deviation `reach_v`, in V.
+pub(crate) fn cost(start_v: &[f64], reach_v: f64, rows: usize) -> f64 {
+    0.5 * (rows.max(2) as f64).ln() * start_v.len() as f64 + 0.5 * dot(start_v, start_v) / reach_v.powi(2)
 }
 
 fn subtract(start: &[f64], kernels: &[Vec<f64>], from: &mut [f64]) {
@@ -169,7 +175,7 @@ mod tests {
     /// The readings of a spring from any row on are explained without residual by the model of that spring.
     #[test]
     fn initial_state_explains_a_record_cut_from_a_longer_one() {
-        let springs: [&[(&str, usize, &[f64])]; 8] = [
+        let springs: [&[(&str, usize, &[f64])]; 12] = [
             &[("time-constant", 0, &[2.0])],
             &[("charge-leakage", 1, &[0.2, 3.0, 0.4]), ("second-relaxation", 1, &[0.2, 3.6])],
             &[("voltage-dependent-time-constant", 0, &[1.2, 2.0]), ("resonance", 2, &[-0.5, -3.0, 0.8, 0.0])],
@@ -178,6 +184,11 @@ mod tests {
             &[("series-lag", 1, &[0.5, 0.2])],
             &[("series-lag", 0, &[0.5]), ("voltage-dependent-time-constant", 0, &[1.2, 2.0])],
             &[("hysteresis", 0, &[3.0]), ("static-nonlinearity", 0, &[0.2])],
+            // Not linear in the initial state.
+            &[("static-nonlinearity", 4, &[0.3])],
+            &[("static-nonlinearity", 5, &[2.0]), ("second-relaxation", 1, &[0.2, 3.6])],
+            &[("voltage-dependent-time-constant", 2, &[1.0, 2.5, 0.1])],
+            &[("voltage-dependent-time-constant", 4, &[1.2, 2.2])],
         ];
         for blocks in springs {
             let model = blocks.iter().fold(Model::default(), |model, &(cause, form, point)| {

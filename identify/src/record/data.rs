@@ -202,6 +202,12 @@ impl Data {
         self.initial_state_unknown || self.normalisation.identified || self.is_joined()
     }
 
+    /// Returns false if a prediction that is not linear in the initial state cannot be fitted: that of one of several records is
+    /// estimated as if it were.
+    pub fn estimates_any_start(&self) -> bool {
+        !self.initial_state_unknown || !self.is_joined()
+    }
+
     /// Returns the number of readings.
     pub fn rows(&self) -> usize {
         self.reading.len()

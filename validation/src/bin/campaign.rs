@@ -17,8 +17,8 @@ use validation::campaign::score::Outcome;
 use validation::campaign::sensitivity::{self, SIZES};
 use validation::campaign::unforeseen::Edition;
 use validation::campaign::{
-    answer_table, criteria, equation, out_of_model, plan, plants, real, reliability, rivals, scales, shared, steps,
-    tables,
+    answer_table, criteria, equation, identified, out_of_model, plan, plants, real, reliability, rivals, scales,
+    shared, steps, tables,
 };
 use validation::criterion::{self, Criterion};
 use validation::ground_truth::noise::{Kind, Noise};
@@ -200,6 +200,8 @@ enum Part {
     Scales,
     /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
     Plants,
+    /// The same records without a plant file: the linear spring is identified, and what it leaves is diagnosed
+    Identified,
     /// Equations of unexplained records, compared with PySINDy and SysIdentPy: 1 record of each law of out-of-model and unforeseen
     Equation,
     /// Comparison with PySINDy and SysIdentPy: 1 record of each cause, and 1 without an effect
@@ -361,8 +363,9 @@ impl Cli {
             Part::Forms | Part::Stress | Part::Speed => self.jobs(part, |_| Vec::new()),
             Part::Shared => self.answers(part, &["causes", "size"], &shared::cases(first, self.count(3))),
             Part::Steps => self.answers(part, &["causes", "experiment"], &steps::cases(first, self.count(3))),
-            Part::Plants => {
-                let cases = plants::cases(first, self.count(8));
+            Part::Plants | Part::Identified => {
+                let cases = if part == Part::Plants { plants::cases } else { identified::cases };
+                let cases = cases(first, self.count(8));
                 self.answers(part, &["cause", "schedule", "noise", "time constants"], &cases)
             }
             Part::Reliability => {

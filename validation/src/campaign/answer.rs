@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::case::Case;
 use super::score::{Estimate, Report, estimates};
-use super::subject::Subject;
+use super::subject::{Nominal, Subject};
 
 /// A probability above which a wrong name counts as confidently wrong.
 pub const SURE: f64 = 0.9;
@@ -90,7 +90,7 @@ impl Answer {
         answer.first_is_right =
             report.findings.first().is_some_and(|finding| expected.first.contains(&finding.cause.as_str()));
         answer.truth_is_mentioned = expected.is_named(|code| is_found(code) || is_rival(code) || is_suspect(code));
-        if subject.nominal.is_none() {
+        if subject.nominal == Nominal::Paper {
             answer.parameters =
                 report.findings.iter().flat_map(|finding| estimates(&subject.hidden, finding)).collect();
         }

@@ -16,12 +16,13 @@ use identify::stats::scale::root_mean_square;
 #[cfg(feature = "sensitivity")]
 pub use identify::stats::thresholds::vary;
 pub use identify::stats::thresholds::{Threshold, empirical::ALL as THRESHOLDS};
-use identify::{Options, examine};
+use identify::{Input, Options, examine};
 use serde_json::Value;
 use simulation::plant_file::PlantFile;
 use simulation::record::Record;
+use simulation::units::Units;
 
-use super::subject::Subject;
+use super::subject::{Nominal, Subject};
 use crate::ground_truth::LabelledRecord;
 
 /// A diagnosis of a record, as the JSON of `vsj diagnose`; tests of the campaign replace it by an oracle.
@@ -66,8 +67,12 @@ pub fn compared_with(record: &Record, nominal: PlantFile) -> Result<Value> {
 /// The record or the spring is rejected.
 pub fn answer(subject: &Subject) -> Result<Value> {
     match &subject.nominal {
-        Some(nominal) => compared_with(&subject.record, nominal.clone()),
-        None => report(&subject.record, &Options::default()),
+        Nominal::Paper => report(&subject.record, &Options::default()),
+        Nominal::Known(nominal) => compared_with(&subject.record, (**nominal).clone()),
+        Nominal::Identified => {
+            let identified = identify::identify(std::slice::from_ref(&subject.record), Input::Hold, &Units::default())?;
+            report(&subject.record, &Options::default().judging(identified)?)
+        }
     }
 }
 
@@ -132,12 +137,11 @@ pub fn hypothesis(record: &Record) -> Result<Hypothesis> {
 pub fn hypothesis_beyond(record: &Record, rows: usize) -> Result<[Option<f64>; 3]> {
     let (mut left, identified) = residual(record, rows, &Options::default())?;
     let extended = root_mean_square(&left.split_off(rows));
-    let whole = identify::nominal::best_linear(std::slice::from_ref(record), identify::Input::Hold);
+    let whole = identify::nominal::best_linear(std::slice::from_ref(record), Input::Hold);
     let linear = whole.map(|linear| linear.error.last_40_percent_rmse);
     let equation = identified.equation.as_ref().map(|fit| {
         let normalisation = &identified.data.normalisation;
-        let prepared =
-            |record: &Record| Data::thinned(&normalisation.record(record), identify::Input::Hold, 1, normalisation);
+        let prepared = |record: &Record| Data::thinned(&normalisation.record(record), Input::Hold, 1, normalisation);
         let (first, data) = (prepared(&first(record, rows)), prepared(record));
         let observed = Observed::new(&data);
         let mut problem = Problem::new(&data, &observed, &UNLIMITED);

@@ -19,6 +19,7 @@
 //! | [`thresholds`] | diagnoses with each empirical threshold of `identify` at half and twice its value |
 //! | [`scales`] | single effects in springs of any size, in any unit |
 //! | [`plants`] | single effects in springs of several time constants, other schedules and noise |
+//! | [`identified`] | the same records without a plant file |
 //! | [`out_of_model`] | records of laws that the diagnosis does not model |
 //! | [`unforeseen`] | records of laws that nobody looked at while the diagnosis was made, in two editions |
 //! | [`reliability`] | stated probabilities compared with frequencies, over all sets |
@@ -36,6 +37,7 @@ pub mod detectable;
 pub mod diagnosis;
 pub mod equation;
 pub mod equation_blocks;
+pub mod identified;
 pub mod isolable;
 pub mod mixture;
 pub mod out_of_model;

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::case::{Case, Expected};
 use super::part::seed;
 use super::scales;
-use super::subject::Subject;
+use super::subject::{Nominal, Subject};
 use super::{detectable, isolable};
 use crate::ground_truth::noise::{Kind as NoiseKind, Noise};
 use crate::ground_truth::physics::{Further, TAU_S};
@@ -96,7 +96,7 @@ fn draw(cause: Option<Cause>, kind: Kind, noise: usize, lags: usize, seed: u64) 
         nominal.relaxation.tau_s.extend(slower.map(|lag| time * lag.tau_s));
         nominal.relaxation.weights = std::iter::once(main).chain(parts).map(|part| (1.0 - size.share) * part).collect();
     }
-    Subject { hidden, record, nominal: Some(nominal) }
+    Subject { hidden, record, nominal: Nominal::Known(Box::new(nominal)) }
 }
 
 /// A record of the paper's spring whose effect, if it has one, an oracle detector could isolate; or the last draw.
@@ -131,12 +131,20 @@ fn isolable_record(
 
 #[cfg(test)]
 mod tests {
+    use simulation::plant_file::PlantFile;
+
     use super::*;
     use crate::ground_truth::spring::Spring;
 
+    /// The plant file of the nominal spring.
+    fn plant(subject: &Subject) -> PlantFile {
+        let Nominal::Known(plant) = &subject.nominal else { panic!("{:?}", subject.nominal) };
+        (**plant).clone()
+    }
+
     /// Response of a nominal spring of the plant file at the record's rows by exact exponentials, in the reading's unit.
     fn nominal_readings(subject: &Subject) -> Vec<f64> {
-        let plant = subject.nominal.clone().unwrap();
+        let plant = plant(subject);
         let (relaxation, reading) = (&plant.relaxation, plant.reading.unwrap());
         let weights =
             if relaxation.weights.is_empty() { vec![1.0 - relaxation.share] } else { relaxation.weights.clone() };
@@ -159,7 +167,7 @@ mod tests {
     fn without_an_effect_the_readings_are_those_of_the_nominal_spring_in_noise() {
         for case in cases(5, 4).into_iter().filter(|case| case.group == "no effect") {
             let subject = (case.draw)(case.seed);
-            let reading = subject.nominal.as_ref().unwrap().reading.unwrap();
+            let reading = plant(&subject).reading.unwrap();
             let span = subject.record.rows.iter().map(|row| row.voltage_v).fold(0.0, f64::max);
             let unit = (reading.gain * span / 500.0).abs();
             let squares: f64 = nominal_readings(&subject)

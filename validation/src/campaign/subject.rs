@@ -12,12 +12,23 @@ pub struct Subject {
     pub hidden: LabelledRecord,
     /// The record that is diagnosed, which may be in other units.
     pub record: Record,
-    /// Nominal spring; `None` for the paper's.
-    pub nominal: Option<PlantFile>,
+    /// Nominal spring.
+    pub nominal: Nominal,
+}
+
+/// The nominal spring with which a record is compared.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Nominal {
+    /// The paper's spring.
+    Paper,
+    /// A spring that is known.
+    Known(Box<PlantFile>),
+    /// The linear spring that is identified from the same record.
+    Identified,
 }
 
 impl From<LabelledRecord> for Subject {
     fn from(hidden: LabelledRecord) -> Self {
-        Self { record: hidden.record(), hidden, nominal: None }
+        Self { record: hidden.record(), hidden, nominal: Nominal::Paper }
     }
 }

@@ -4,7 +4,7 @@ use super::answer::Answer;
 use super::answer_table::{legend, page as tables};
 use super::case::{Case, Expected};
 use super::part::seed;
-use super::subject::Subject;
+use super::subject::{Nominal, Subject};
 use crate::ground_truth::unforeseen::law::Law;
 use crate::ground_truth::{unforeseen, unseen};
 use crate::markdown::table;
@@ -77,7 +77,7 @@ fn of(family: &str, law: Law, seed: u64) -> Case {
         },
         draw: Box::new(move |seed| {
             let (hidden, record) = law.draw(seed);
-            Subject { hidden, record, nominal: None }
+            Subject { hidden, record, nominal: Nominal::Paper }
         }),
     }
 }
