@@ -9,6 +9,7 @@
 //! - *Quantisation grid*: equally spaced values to which the readings were rounded.
 //! - *Censored reading*: one that stopped at a bound of the sensor.
 
+pub mod bounds;
 pub(crate) mod changes;
 pub mod data;
 pub(crate) mod decay;

@@ -7,15 +7,12 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::dimension::Dimension;
+use crate::record::bounds::{Bounds, Distinct, scatter};
 use crate::record::data::Data;
 use crate::record::heteroscedasticity;
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::record::scales::Scales;
-use crate::stats::median::robust_deviation;
-use crate::stats::scale::second_differences;
-use crate::stats::thresholds::empirical::{
-    BOUND_TO_NEXT_STEP, CLOSE_TO_BOUND, COARSE, FEWEST_TIES, FINEST_V, LEAST_TRUNCATION,
-};
+use crate::stats::thresholds::empirical::{COARSE, FINEST_V, LEAST_TRUNCATION};
 
 /// What one reading says about the true value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,36 +53,10 @@ impl Observed {
         if data.is_joined() {
             return Self::joined(&data.parts.iter().map(|part| Self::new(&part.data)).collect::<Vec<_>>());
         }
-        let mut sorted = data.reading.clone();
-        sorted.sort_by(f64::total_cmp);
-        let mut counts: Vec<(f64, usize)> = Vec::new();
-        for value in sorted {
-            match counts.last_mut() {
-                Some((last, count)) if *last == value => *count += 1,
-                _ => counts.push((value, 1)),
-            }
-        }
-        let distinct: Vec<f64> = counts.iter().map(|&(value, _)| value).collect();
-        let grid = match distinct.len() {
-            0..=5 => None,
-            many => printed_grid(&distinct[1..many - 1], data.scales()),
-        };
-        let ties = counts.iter().filter(|(_, count)| *count > 1).count();
-        let continuous = ties <= counts.len() / 50 + 2;
-        let most_repeated = counts.iter().skip(1).rev().skip(1).map(|(_, count)| *count).max().unwrap_or(1);
+        let distinct = Distinct::of(&data.reading);
+        let grid = distinct.between_extremes().and_then(|values| printed_grid(&values, data.scales()));
         let scatter_v = scatter(&data.reading).max(FINEST_V.get());
-        let far = CLOSE_TO_BOUND.get() * scatter_v;
-        let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
-            let (value, count) = *extreme?;
-            // On a grid the next step is a fair judge; without one, any reading that is often the same.
-            let compared = if grid.is_some() { next.map_or(1, |next| next.1) } else { most_repeated };
-            let piled = count >= FEWEST_TIES.count() && (continuous || count >= BOUND_TO_NEXT_STEP.count() * compared);
-            // A spring at rest reads exactly zero many times.
-            (piled && count < data.rows() && value != 0.0 && stays(&data.reading, value, far)).then_some(value)
-        };
-        let moves = data.reading.first() != data.reading.last() || counts.len() > 2;
-        let upper = bound(counts.last(), counts.iter().rev().nth(1)).filter(|_| moves);
-        let lower = bound(counts.first(), counts.get(1)).filter(|_| moves);
+        let Bounds { upper, lower } = Bounds::of(&data.reading, &distinct, grid.map(|grid| grid.step), scatter_v);
         let kinds: Vec<Kind> = data
             .reading
             .iter()
@@ -197,65 +168,4 @@ fn printed_grid(values: &[f64], scales: &Scales) -> Option<QuantisationGrid> {
         [grid.step, grid.low, grid.high].map(|size| size / scales.reading.abs())
     };
     Some(QuantisationGrid { step, low, high })
-}
-
-/// Returns true if at least half of the readings with this value have a neighbour within `far`, in V; isolated error
-/// codes have none.
-fn stays(reading: &[f64], value: f64, far: f64) -> bool {
-    let near = |row: Option<&f64>| row.is_some_and(|other| (other - value).abs() <= far);
-    let rows = || (0..reading.len()).filter(|&row| reading[row] == value);
-    let staying = rows().filter(|&row| near(reading.get(row + 1)) || near(reading.get(row.wrapping_sub(1)))).count();
-    2 * staying >= rows().count()
-}
-
-/// Returns the scale of independent noise, in V; 0 if most readings repeat.
-fn scatter(reading: &[f64]) -> f64 {
-    robust_deviation(second_differences(reading)).unwrap_or(f64::INFINITY)
-}
-
-#[cfg(test)]
-mod tests {
-    use simulation::record::{Record, Row};
-
-    use super::*;
-    use crate::record::input::Input;
-    use crate::stats::scale::normals;
-
-    /// Upper bound of readings of a stair of 0 to 400 V in 1200 rows with noise of 1 V, as a sensor takes them.
-    fn upper(seed: usize, sensor: impl Fn(Vec<f64>) -> Vec<f64>) -> Option<f64> {
-        let volts = |row: usize| 100.0 * (row / 120 % 5) as f64;
-        let noisy = normals(1200 * (seed + 1))[1200 * seed..]
-            .iter()
-            .enumerate()
-            .map(|(row, noise)| volts(row) + noise)
-            .collect();
-        let row =
-            |(row, reading)| Row { line: row, time_s: row as f64, voltage_v: volts(row), measured: Some(reading) };
-        let record = Record { name: String::new(), rows: sensor(noisy).into_iter().enumerate().map(row).collect() };
-        Observed::new(&Data::new(&record, Input::Hold)).upper
-    }
-
-    #[test]
-    fn readings_that_accumulate_at_the_extreme_alone_are_a_bound() {
-        let stopped = |read: Vec<f64>| read.into_iter().map(|reading| reading.min(350.0)).collect();
-        assert_eq!(upper(0, stopped), Some(350.0));
-        assert_eq!(upper(0, |read| read), None);
-        // A median of some readings is often the same reading as the one before, at the extreme as well.
-        let median = |length: usize, read: Vec<f64>| {
-            let of = |rows: &[f64]| {
-                let mut rows = rows.to_vec();
-                rows.sort_by(f64::total_cmp);
-                rows[rows.len() / 2]
-            };
-            (0..read.len()).map(|row| of(&read[(row + 1).saturating_sub(length)..=row])).collect::<Vec<_>>()
-        };
-        for (seed, length) in (0..20).flat_map(|seed| [9, 17, 25].map(|length| (seed, length))) {
-            assert_eq!(upper(seed, |read| median(length, read)), None, "{seed}, {length}");
-        }
-        assert_eq!(upper(0, |read| stopped(median(15, read))), Some(350.0));
-        // A counter of periods has steps that grow with the reading, and two codes for the highest level, one of them seldom.
-        let counted =
-            |read: Vec<f64>| read.into_iter().map(|y| 30_199.0 / (30_199.0 / (y + 200.0)).round() - 200.0).collect();
-        assert_eq!(upper(0, counted), None);
-    }
 }
