@@ -67,7 +67,12 @@ impl Effect for VoltageDependentTimeConstant {
             point.extend(by_state(form).then_some(context.data.normalisation.share));
             point
         };
-        INITIAL_TIME_CONSTANTS_S.map(start).to_vec()
+        let starts: &[(f64, f64)] = match form == BY_DIRECTION || by_state(form) {
+            // Each takes several simulations.
+            true if context.data.initial_state_unknown => &INITIAL_TIME_CONSTANTS_S[2..4],
+            _ => &INITIAL_TIME_CONSTANTS_S,
+        };
+        starts.iter().copied().map(start).collect()
     }
 
     fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {

@@ -405,11 +405,14 @@ impl<'a> Engine<'a> {
         let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
         let mut settled = false;
+        let mut start = None;
         for _ in 0..rounds {
             if self.budget.is_over() {
                 break;
             }
-            let jacobian = self.jacobian_beside(known, &model, &noise, &residual);
+            start = self.start_near(&model, start.as_ref());
+            let all = 0..points.len();
+            let jacobian = self.jacobian_of(all, known, start.as_ref(), &model, &noise, &residual);
             if jacobian.places.is_empty() {
                 settled = true;
                 break;
@@ -430,7 +433,7 @@ impl<'a> Engine<'a> {
                 }
                 let mut candidate = model.clone();
                 candidate.set_points(&moved);
-                let there = self.residual(&candidate);
+                let there = self.residual_near(&candidate, start.as_ref());
                 self.budget.spend(work::SCALE * there.len() as u64);
                 let (noise_there, value_there) = law.rescaled(&there, self.observed);
                 if value_there > value {
@@ -457,7 +460,9 @@ impl<'a> Engine<'a> {
     /// Returns the same for the coordinates of the blocks alone.
     pub fn linearised_by_blocks(&mut self, fit: &Fit) -> (Jacobian, Vec<Term>) {
         let blocks = fit.model.blocks.iter().map(|(_, point)| point.len()).sum();
-        let jacobian = self.jacobian_of(0..blocks, &Known::default(), &fit.model, &fit.noise, &fit.residual);
+        let start = self.start(&fit.model);
+        let jacobian =
+            self.jacobian_of(0..blocks, &Known::default(), start.as_ref(), &fit.model, &fit.noise, &fit.residual);
         (jacobian, self.terms(&fit.noise, &fit.residual))
     }
 
@@ -471,19 +476,17 @@ impl<'a> Engine<'a> {
     /// initial state follows with the weights and kernels that it has at the model (Kaufman's approximation of variable
     /// projection, BIT 15, 1975): one simulation for each column instead of one for each state of it as well.
     pub fn jacobian(&mut self, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
-        self.jacobian_beside(&Known::default(), model, noise, residual)
+        let start = self.start(model);
+        self.jacobian_of(0..model.points().len(), &Known::default(), start.as_ref(), model, noise, residual)
     }
 
-    /// Returns the same, with the columns that are known.
-    fn jacobian_beside(&mut self, known: &Known, model: &Model, noise: &Noise, residual: &[f64]) -> Jacobian {
-        self.jacobian_of(0..model.points().len(), known, model, noise, residual)
-    }
-
-    /// Returns the same for a range of the coordinates.
+    /// Returns the same for a range of the coordinates, with the columns that are known and from the initial state at the model, if that
+    /// is unknown.
     fn jacobian_of(
         &mut self,
         wanted: Range<usize>,
         known: &Known,
+        start: Option<&Start>,
         model: &Model,
         noise: &Noise,
         residual: &[f64],
@@ -493,8 +496,7 @@ impl<'a> Engine<'a> {
         let points = model.points();
         let places: Vec<usize> = wanted.filter(|&place| bounds[place].fitted).collect();
         let mut nudged = model.clone();
-        let start = self.start(model);
-        let residual = start.as_ref().map_or(residual, |start| &start.residual);
+        let residual = start.map_or(residual, |start| &start.residual);
         let columns = places.iter().map(|&place| {
             if let Some(column) = known.column(coordinates[place]) {
                 return column.clone();
@@ -507,12 +509,12 @@ impl<'a> Engine<'a> {
             let mut moved = points.clone();
             moved[place] += step;
             nudged.set_points(&moved);
-            let there = match &start {
+            let there = match start {
                 Some(start) => self.residual_from(&nudged, &start.start_v),
                 None => self.residual(&nudged),
             };
             let mut column: Vec<f64> = residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect();
-            if let Some(start) = &start {
+            if let Some(start) = start {
                 start.estimate.follow(&mut column, &start.kernels);
                 self.budget.spend(start.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
             }

@@ -1,13 +1,17 @@
 //! What is estimated for each model instead of being moved by a fit: the initial state, and zero and gain of the reading under a
 //! nominal spring that was identified from the same readings.
+//!
+//! Of a prediction that is linear in them it is one least squares estimate. Elsewhere Gauss-Newton steps are taken, from rest or, while
+//! a fit moves the model, from the estimate at the last one.
 
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, work};
-use crate::plant::initial_state::Estimate;
+use crate::plant::initial_state::{self, Estimate};
 use crate::record::observed::Kind;
 
-/// Gauss-Newton steps to an initial state in which the prediction is not linear; the last has the kernels of the one before.
-const STEPS: usize = 3;
+/// Gauss-Newton steps from rest, and from an estimate at a similar model.
+const STEPS_FROM_REST: usize = 3;
+const STEPS_NEAR: usize = 2;
 /// Smallest step after which another is taken, relative to the full scale.
 const SMALL_STEP: f64 = 1e-3;
 
@@ -21,6 +25,19 @@ pub(super) struct Start {
     pub(super) kernels: Vec<Vec<f64>>,
     /// Reading minus prediction from there, in V.
     pub(super) residual: Vec<f64>,
+    /// True if the prediction is linear in the offsets.
+    linear: bool,
+}
+
+/// Where Gauss-Newton steps begin.
+struct Approach {
+    start_v: Vec<f64>,
+    kernels: Vec<Vec<f64>>,
+    residual: Vec<f64>,
+    /// Largest number of steps.
+    steps: usize,
+    /// The first step before which the kernels are computed anew.
+    renewed_from: usize,
 }
 
 impl Engine<'_> {
@@ -33,20 +50,47 @@ impl Engine<'_> {
         self.start_by(model, |row| observed.kinds[row] == Kind::Exact)
     }
 
-    /// Returns the same from the rows for which `counts` is true. Where the prediction is not linear, Gauss-Newton steps are taken as long
-    /// as they make the error smaller.
+    /// Returns the same from the rows for which `counts` is true.
     pub(super) fn start_by(&mut self, model: &Model, counts: impl Fn(usize) -> bool) -> Option<Start> {
-        let mut residual = self.residual_from_rest(model);
-        let mut kernels = self.initial_states(model).to_vec();
+        let residual = self.residual_from_rest(model);
+        let kernels = self.initial_states(model).to_vec();
+        let steps = if self.simulator.is_linear_in_start() { 1 } else { STEPS_FROM_REST };
+        let from = Approach { start_v: vec![0.0; kernels.len()], kernels, residual, steps, renewed_from: 1 };
+        self.approached_start(model, from, counts)
+    }
+
+    /// Returns the estimate of a single record at a model near that at a similar one, if that is known.
+    pub(super) fn start_near(&mut self, model: &Model, known: Option<&Start>) -> Option<Start> {
+        let Some(known) = known.filter(|known| !known.linear) else { return self.start(model) };
+        let (start_v, kernels) = (known.start_v.clone(), known.kernels.clone());
+        let residual = self.residual_from(model, &start_v);
+        let observed = self.observed;
+        let from = Approach { start_v, kernels, residual, steps: STEPS_NEAR, renewed_from: 0 };
+        self.approached_start(model, from, |row| observed.kinds[row] == Kind::Exact)
+    }
+
+    /// Returns reading minus prediction of each row, in V, with the most likely initial state; to first order around the one at a similar
+    /// model, if that is known and the prediction is not linear in it.
+    pub(super) fn residual_near(&mut self, model: &Model, known: Option<&Start>) -> Vec<f64> {
+        let Some(known) = known.filter(|known| !known.linear) else { return self.residual(model) };
+        let mut residual = self.residual_from(model, &known.start_v);
+        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        initial_state::subtract_estimate(&mut residual, &known.kernels, self.data.full_scale_v, exact);
+        self.budget.spend(work::INITIAL_STATE * (known.kernels.len() * residual.len()) as u64);
+        residual
+    }
+
+    /// Takes Gauss-Newton steps as long as they make the error in the rows for which `counts` is true smaller.
+    fn approached_start(&mut self, model: &Model, from: Approach, counts: impl Fn(usize) -> bool) -> Option<Start> {
+        let Approach { mut start_v, mut kernels, mut residual, steps, renewed_from } = from;
         let reach_v = self.data.full_scale_v;
-        let steps = if self.simulator.is_linear_in_start() { 1 } else { STEPS };
         let squares = |residual: &[f64]| -> f64 {
             residual.iter().enumerate().filter(|(row, _)| counts(*row)).map(|(_, left)| left * left).sum()
         };
-        let mut start_v = vec![0.0; kernels.len()];
+        let linear = self.simulator.is_linear_in_start();
         let mut found: Option<Start> = None;
         for step in 0..steps {
-            if step == 1 {
+            if step >= renewed_from {
                 self.simulator.update_kernels(model, &start_v, &mut kernels);
             }
             let estimate = Estimate::of(&residual, &kernels, reach_v, &counts)?;
@@ -57,8 +101,8 @@ impl Engine<'_> {
             if found.as_ref().is_some_and(|best| squares(&residual) >= squares(&best.residual)) {
                 break;
             }
-            let kernels = kernels.clone();
-            found = Some(Start { start_v: start_v.clone(), estimate, kernels, residual: residual.clone() });
+            let (start_v, residual) = (start_v.clone(), residual.clone());
+            found = Some(Start { start_v, estimate, kernels: kernels.clone(), residual, linear });
             if is_small {
                 break;
             }
