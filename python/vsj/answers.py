@@ -98,6 +98,15 @@ class FarReading:
 
 
 @dataclass(frozen=True)
+class AtBound:
+    """``readings`` readings of a record that stopped at the sensor's bound ``limit``, in their unit."""
+
+    record: str
+    limit: float
+    readings: int
+
+
+@dataclass(frozen=True)
 class ErrorStatistics:
     """The errors that the linear spring leaves."""
 
@@ -327,7 +336,7 @@ class Identified(Answer):
 
     ``plant`` is the text of a plant file. ``courses`` holds the name of each record and its arrays of shape ``(n,)``: ``time_s``
     in s, ``voltage_v`` in V, ``reading``, ``model``, ``residual`` and ``held_out`` (reading minus a prediction by a fit that did
-    not use the segment) in the reading's unit, without the readings of ``left_out``.
+    not use the segment) in the reading's unit, without the readings of ``left_out`` and ``at_bound``.
     """
 
     schema: int
@@ -344,6 +353,7 @@ class Identified(Answer):
     start: List[Start]
     noise: ErrorStatistics
     left_out: List[FarReading]
+    at_bound: List[AtBound]
     remarks: List[str]
     unit: str
     model: Optional[str]

@@ -123,6 +123,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         noise,
         remarks: Vec::new(),
         left_out: Vec::new(),
+        at_bound: Vec::new(),
         unit: reading.into(),
         model: None,
     };

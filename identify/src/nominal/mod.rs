@@ -32,8 +32,9 @@ use crate::linear::{Problem, Series, best_up_to};
 use crate::nominal::identified::described;
 use crate::nominal::models::Models;
 use crate::nominal::plant::VoltageRange;
-use crate::nominal::report::{FarReading, InputLaw};
+use crate::nominal::report::{AtBound, FarReading, InputLaw};
 use crate::nominal::usable::check;
+use crate::record::bounds::Bounds;
 use crate::record::input::Input;
 
 /// Largest held-out error under the square of a voltage of one sign, relative to that under the voltage, with which it is the law.
@@ -41,8 +42,8 @@ const MOST_OF_SQUARE: f64 = 0.5;
 /// Most searches for the best model without the readings that were far from the one before.
 const MOST_SEARCHES: usize = 3;
 
-/// Identifies the spring of one or several records; each has its own zero and start. Readings that are far from all around them are
-/// left out.
+/// Identifies the spring of one or several records; each has its own zero and start. Readings that stopped at a bound of the sensor, and
+/// those that are far from all around them, are left out.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
@@ -53,7 +54,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     for record in records {
         check(record)?;
     }
-    let mut kept = Cow::Borrowed(records);
+    let (mut kept, stopped) = without_stopped(records);
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();
     leave_out(&mut kept, far, &mut left_out);
@@ -72,7 +73,38 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         identified.report.remarks.insert(0, remarks::left_out(&left_out, units));
         identified.report.left_out = left_out;
     }
+    if !stopped.is_empty() {
+        identified.linear = None;
+        identified.report.remarks.insert(0, remarks::at_bounds(&stopped, units));
+        identified.report.at_bound = stopped;
+    }
     Ok(identified)
+}
+
+/// Takes the readings that stopped at a bound of the sensor out of each record, and lists them; all stay in a record that could not be
+/// identified without them.
+fn without_stopped(records: &[Record]) -> (Cow<'_, [Record]>, Vec<AtBound>) {
+    let mut stopped = Vec::new();
+    let mut kept = Cow::Borrowed(records);
+    for (index, record) in records.iter().enumerate() {
+        let readings: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
+        let bounds = Bounds::of_file(&readings);
+        let mut without = record.clone();
+        for row in &mut without.rows {
+            row.measured = row.measured.filter(|reading| !bounds.stopped(*reading));
+        }
+        let limits = bounds.upper.into_iter().chain(bounds.lower);
+        if limits.clone().next().is_none() || check(&without).is_err() {
+            continue;
+        }
+        kept.to_mut()[index] = without;
+        stopped.extend(limits.map(|limit| AtBound {
+            record: record.name.clone(),
+            limit,
+            readings: readings.iter().filter(|reading| **reading == limit).count(),
+        }));
+    }
+    (kept, stopped)
 }
 
 /// Takes readings out of each record, by their number among its readings, and adds them to a list. Returns false if there are none, or

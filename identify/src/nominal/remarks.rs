@@ -5,7 +5,7 @@ use simulation::units::Units;
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem};
 use crate::nominal::models::STRUCTURED;
-use crate::nominal::report::{FarReading, InputLaw, Report};
+use crate::nominal::report::{AtBound, FarReading, InputLaw, Report};
 
 /// A time constant with a larger ratio of its bounds is hardly known.
 const HARDLY_KNOWN: f64 = 4.0;
@@ -27,6 +27,19 @@ pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
         times.join(", "),
         if readings.len() > LISTED { ", ..." } else { "" },
         units.time.name
+    )
+}
+
+/// The remark on readings that stopped at a bound of the sensor.
+pub(super) fn at_bounds(stopped: &[AtBound], units: &Units) -> String {
+    let readings: usize = stopped.iter().map(|at| at.readings).sum();
+    let mut limits: Vec<String> =
+        stopped.iter().map(|at| format!("{} {}", significant(at.limit, 6), units.reading)).collect();
+    limits.dedup();
+    format!(
+        "{readings} readings at {}, where the sensor saturates, are left out of the model and of its errors; `vsj diagnose` judges all \
+         readings.",
+        limits.join(" and ")
     )
 }
 

@@ -88,6 +88,17 @@ pub struct FarReading {
     pub reading: f64,
 }
 
+/// Readings that stopped at a bound of the sensor, so that they were left out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AtBound {
+    /// Name of the record.
+    pub record: String,
+    /// The bound, in the reading's unit.
+    pub limit: f64,
+    /// Number of readings at it.
+    pub readings: usize,
+}
+
 /// What of the voltage the spring responds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -129,8 +140,10 @@ pub struct Report {
     pub start: Vec<Start>,
     /// The errors that the model leaves.
     pub noise: Noise,
-    /// The readings that were left out.
+    /// The readings that were left out because they are far from all others.
     pub left_out: Vec<FarReading>,
+    /// The readings that were left out because they stopped at a bound.
+    pub at_bound: Vec<AtBound>,
     /// What the records cannot tell, one sentence each.
     pub remarks: Vec<String>,
     /// Name of the reading's unit.

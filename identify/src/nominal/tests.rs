@@ -56,6 +56,24 @@ fn intervals_contain_the_truth_in_about_95_percent_of_the_records() {
     }
 }
 
+/// Fitted as they are, readings at a bound would lower the gain and add time constants.
+#[test]
+fn readings_at_a_bound_of_the_sensor_are_left_out() {
+    let whole = record(600, 3000, 0.0, 0.1);
+    let mut readings: Vec<f64> = whole.rows.iter().filter_map(|row| row.measured).collect();
+    readings.sort_by(f64::total_cmp);
+    let limit = readings[450];
+    let mut stopped = whole.clone();
+    stopped.rows.iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading.min(limit)));
+    let [report, expected] = [&stopped, &whole].map(|record| found(std::slice::from_ref(record)).report);
+    assert_eq!((report.rows, report.order, report.at_bound.len()), (450, expected.order, 1), "{report:?}");
+    assert_eq!((report.at_bound[0].limit, report.at_bound[0].readings), (limit, 150));
+    let near = |of: &Report| [of.nominal.gain.value / 0.5, of.nominal.tau_s[0].tau.value / 4.0];
+    assert!(near(&report).iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{:?}", near(&report));
+    assert!(report.remarks[0].contains("150 readings at"), "{:?}", report.remarks);
+    assert!(expected.at_bound.is_empty() && expected.rows == 600);
+}
+
 /// Least squares would let a delay, a quick time constant or an oscillation follow such readings, and widen the intervals.
 #[test]
 fn readings_that_no_spring_made_are_left_out() {
