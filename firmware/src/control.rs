@@ -61,8 +61,8 @@ impl Stopwatch for Untimed {
 
 /// Source of the host's commands for the control task.
 pub trait Source {
-    /// Command for tick number `tick`; `None` ends the control task.
-    fn command(&mut self, tick: u32) -> Option<Command>;
+    /// Command for tick number `tick`, counted from 0 at the start; `None` ends the control task.
+    fn command(&mut self, tick: u64) -> Option<Command>;
 
     /// Called after each tick with its result and the number of ticks missed so far.
     fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
