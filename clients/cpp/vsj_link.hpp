@@ -27,6 +27,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -596,8 +597,8 @@ private:
     Bytes encoded_;
     std::deque<std::uint8_t> received_;
     std::deque<Sample> samples_;
-    /// Number of a report of faults whose receipt the microcontroller does not know of yet.
-    std::optional<std::uint32_t> unheard_;
+    /// Numbers of the reports of faults whose receipt the microcontroller does not know of yet.
+    std::set<std::uint32_t> unheard_;
     Clock::duration beat_{};
     Clock::time_point heard_ = Clock::now();
     std::mutex closing_lock_;
@@ -667,10 +668,11 @@ private:
             if (every_ticks_ > 0) exchange(wire::Writer().byte(7).number(every_ticks_).bytes);
         }
         const Bytes reply = exchange(message);
-        if (unheard_) {
-            const auto number = *unheard_;
-            unheard_.reset();
+        // One that arrives meanwhile is for the next request.
+        for (const auto number : std::set<std::uint32_t>(unheard_)) {
             exchange(wire::Writer().byte(12).number(number).bytes);
+            // Only now: until then the microcontroller may have repeated it.
+            unheard_.erase(number);
         }
         return reply;
     }
@@ -717,7 +719,7 @@ private:
                     const Sample sample = Sample::read(from, status_.rate_hz);
                     if (from.is_whole()) samples_.push_back(sample);
                 } else if (code == 5) {
-                    unheard_ = static_cast<std::uint32_t>(from.number());
+                    unheard_.insert(static_cast<std::uint32_t>(from.number()));
                 } else {
                     return packet;
                 }

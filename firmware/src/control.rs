@@ -61,8 +61,8 @@ impl Stopwatch for Untimed {
 
 /// Source of the host's commands for the control task.
 pub trait Source {
-    /// Command for tick number `tick`; `None` ends the control task.
-    fn command(&mut self, tick: u32) -> Option<Command>;
+    /// Command for tick number `tick`, counted from 0 at the start; `None` ends the control task.
+    fn command(&mut self, tick: u64) -> Option<Command>;
 
     /// Called after each tick with its result and the number of ticks missed so far.
     fn done(&mut self, _tick: &Tick, _control: &Control, _overruns: u32) {}
@@ -263,7 +263,7 @@ pub fn whole_tick<E: Estimator>(config: &Config<E>, state: &mut State<E::State>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::SETTINGS;
+    use crate::settings::{SETTINGS, SUPERVISION};
     use model::Amplifier;
 
     /// If NaN meant no limit, the amplifier would apply 700 V to a spring with a lower limit.
@@ -278,5 +278,19 @@ mod tests {
         assert_eq!(check(Some(650.0), Some(2000.0)), Ok(()));
         assert_eq!(check(Some(f64::NAN), None), Err("max_v"));
         assert_eq!(check(None, Some(f64::NAN)), Err("slew_v_per_s"));
+    }
+
+    #[test]
+    fn a_host_that_has_been_silent_for_weeks_is_still_silent() {
+        let mut control = Control::new(&SETTINGS, &SUPERVISION, None).unwrap();
+        control.ticks_since_host = u32::MAX - 1;
+        let arm = Command { heard: false, arming: Some(supervisor::Command::Arm), target: None };
+        let sensors = Sensors { interlock_closed: true, ..Sensors::default() };
+        for _ in 0..3 {
+            control.tick(&arm, &sensors, &mut Untimed);
+            assert_eq!(control.supervisor().refusal(), Some(supervisor::Refusal::HostSilent));
+        }
+        control.tick(&Command { heard: true, ..arm }, &sensors, &mut Untimed);
+        assert_eq!(control.supervisor().state(), supervisor::State::Armed);
     }
 }

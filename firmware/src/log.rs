@@ -1,4 +1,5 @@
-//! All log lines of the firmware. `vsj log` interprets these formats. Times are in us since boot.
+//! All log lines of the firmware. `vsj log` interprets these formats. Times are in us since boot. Numbers of ticks are the low 32
+//! bits of those since boot: at 1 kHz they begin again with 0 after 49.7 days.
 //!
 //! The control task does not log, because logging takes an unbounded time. It queues [`Event`]s, which the housekeeping task
 //! logs. On the real board the logger never waits for a reader: unread lines are overwritten. Panics and hard faults are
@@ -36,7 +37,7 @@ pub enum Event {
     Sensor(Sensor, u32),
     /// Change of the isolation bank's verdict, and the tick.
     #[cfg(feature = "isolation")]
-    Isolation(News, u32),
+    Isolation(News, u64),
     /// Statistics, once per second.
     Summary(Summary),
 }
@@ -44,7 +45,7 @@ pub enum Event {
 /// Statistics of the last second and since boot.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary {
-    /// Number of ticks since boot.
+    /// Low 32 bits of the number of ticks since boot.
     pub tick: u32,
     /// Number of missed ticks since boot.
     pub overruns: u32,
@@ -78,7 +79,7 @@ pub fn queue(event: Event) {
 }
 
 /// Queues a change of the isolation bank's verdict at `tick`.
-pub fn isolation(news: &News, tick: u32) {
+pub fn isolation(news: &News, tick: u64) {
     #[cfg(feature = "isolation")]
     if news.report.verdict != news.before {
         queue(Event::Isolation(*news, tick));
@@ -90,7 +91,7 @@ pub fn isolation(news: &News, tick: u32) {
 /// Logs a change of the adaptation after the block that ended with `tick`: what it does, and the running parameters as ratios to those of
 /// the stored model.
 #[cfg(feature = "adaptation")]
-pub fn adaptation(change: &crate::adaptation::Change, tick: u32) {
+pub fn adaptation(change: &crate::adaptation::Change, tick: u64) {
     let parameters = change.parameters;
     info!(
         "adaptation {=str} time_constant={=f64} share={=f64} gain={=f64} tick={=u32}",
@@ -98,7 +99,7 @@ pub fn adaptation(change: &crate::adaptation::Change, tick: u32) {
         parameters.time_constant,
         parameters.share,
         parameters.gain,
-        tick
+        tick as u32
     );
 }
 
@@ -179,9 +180,9 @@ pub fn event(event: Event) {
 /// Logs the isolation bank's verdict. A name that goes is `withdrawn`.
 #[cfg(feature = "isolation")]
 #[inline(never)]
-fn isolated(news: &News, tick: u32) {
-    let News { report, since_ticks, before } = news;
-    let since_tick = tick.saturating_sub(*since_ticks);
+fn isolated(news: &News, tick: u64) {
+    let News { report, before, .. } = news;
+    let (since_tick, tick) = (news.since_tick(tick) as u32, tick as u32);
     let said = crate::isolation::describe(report, 0, 0);
     match (report.verdict, before) {
         (Verdict::Named(_) | Verdict::Ambiguous(..), _) => {

@@ -19,7 +19,7 @@ unsafe extern "Rust" {
     safe fn switch_amplifier_off();
 }
 
-/// Number of ticks since boot, for the log of a fault.
+/// Low 32 bits of the number of ticks since boot, for the log of a fault.
 pub static TICK: AtomicU32 = AtomicU32::new(0);
 
 /// True from the first stop on: a failure during the stop only resets.

@@ -22,6 +22,8 @@ pub struct Timing {
     hang_ms: u32,
     /// Ticks without a complete round of the task watchdog after which the output is disabled.
     incomplete_ticks: u32,
+    /// Number of the first tick.
+    first_tick: u64,
 }
 
 impl Timing {
@@ -29,7 +31,12 @@ impl Timing {
     pub fn of(settings: &device::Settings) -> Self {
         let rate_hz = settings.rate_hz();
         let device::Watchdogs { hang_ms, stall_ms, .. } = settings.watchdogs;
-        Self { rate_hz, hang_ms, incomplete_ticks: rate_hz * stall_ms / 1000 }
+        Self { rate_hz, hang_ms, incomplete_ticks: rate_hz * stall_ms / 1000, first_tick: 0 }
+    }
+
+    /// The same times, with ticks counted from `first_tick` on: a board that has run for weeks.
+    pub fn counted_from(self, first_tick: u64) -> Self {
+        Self { first_tick, ..self }
     }
 }
 
@@ -42,13 +49,13 @@ pub async fn control<B: Board>(
     source: &mut impl Source,
     stopwatch: &mut impl Stopwatch,
     timing: Timing,
-) -> (u32, u32) {
+) -> (u64, u32) {
     TASK_WATCHDOG.register(Task::Control);
     let mut pace = Pace::new(Instant::now().as_micros(), u64::from(1_000_000 / timing.rate_hz.max(1)));
     let state = link::State::from(control.supervisor()).name();
     let mut report = Report { rate_hz: timing.rate_hz, state, ..Report::default() };
     let mut incomplete: u32 = 0;
-    let mut ticks: u32 = 0;
+    let mut ticks = timing.first_tick;
     loop {
         Timer::at(Instant::from_micros(pace.due_us())).await;
         let arrival = pace.arrive(Instant::now().as_micros());
@@ -70,10 +77,11 @@ pub async fn control<B: Board>(
         report.overruns = report.overruns.saturating_add(arrival.missed_ticks);
         source.done(&tick, control, report.overruns);
 
-        ticks = ticks.wrapping_add(1);
-        stop::TICK.store(ticks, Ordering::Relaxed);
+        ticks += 1;
+        // The log has the low 32 bits.
+        stop::TICK.store(ticks as u32, Ordering::Relaxed);
         report.late(arrival.lateness_us);
-        report.tick(ticks, control, &tick);
+        report.tick(ticks as u32, control, &tick);
         // Last: nothing of the output waits for it.
         if let Some(news) = isolation.tick(control, &tick) {
             source.isolated(&news);
@@ -91,7 +99,7 @@ pub async fn control<B: Board>(
         }
     }
     hang_guard::rest();
-    (ticks, report.overruns)
+    (ticks - timing.first_tick, report.overruns)
 }
 
 /// The last reported values, so that only changes are logged.

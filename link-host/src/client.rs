@@ -52,8 +52,8 @@ pub struct Client {
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
-    /// The last report of faults whose receipt the MCU does not know of yet.
-    unheard: Option<FaultReport>,
+    /// Reports of faults whose receipt the MCU does not know of yet.
+    unheard: Vec<FaultReport>,
     reports: Vec<FaultReport>,
 }
 
@@ -78,7 +78,7 @@ impl Client {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let sequence = Sequence((now.as_micros() as u16).wrapping_add(std::process::id() as u16));
         let (receiver, read, samples) = (Receiver::new(), VecDeque::new(), VecDeque::new());
-        let (session, requests, every_ticks, unheard, reports) = (Nonce::NONE, 0, 0, None, Vec::new());
+        let (session, requests, every_ticks, unheard, reports) = (Nonce::NONE, 0, 0, Vec::new(), Vec::new());
         let mut client = Self {
             port,
             patience,
@@ -144,10 +144,14 @@ impl Client {
             self.every_ticks = every_ticks;
         }
         let reply = self.exchange(request);
-        if matches!(reply, Ok(_) | Err(Failure::Refused(_)))
-            && let Some(report) = self.unheard.take()
-        {
-            self.exchange(Request::Heard { number: report.number })?;
+        if matches!(reply, Ok(_) | Err(Failure::Refused(_))) {
+            // One that arrives meanwhile is for the next request.
+            for number in self.unheard.iter().map(|report| report.number).collect::<Vec<_>>() {
+                let heard = self.exchange(Request::Heard { number });
+                // Only now: until then the MCU may have repeated it.
+                self.unheard.retain(|report| report.number != number);
+                heard?;
+            }
         }
         reply
     }
@@ -186,11 +190,13 @@ impl Client {
                 match packet.read::<Reply>() {
                     Ok(Reply::Telemetry(sample)) => self.samples.push_back(sample),
                     Ok(Reply::Fault(report)) => {
-                        // A repeated one.
-                        if self.reports.last() != Some(&report) && self.unheard != Some(report) {
+                        // A repetition differs in the faults that stand when it is sent.
+                        let repeats =
+                            |known: &FaultReport| FaultReport { standing: known.standing, ..report } == *known;
+                        if !self.unheard.iter().any(repeats) {
                             self.reports.push(report);
+                            self.unheard.push(report);
                         }
-                        self.unheard = Some(report);
                     }
                     Ok(reply) => return Ok(Some(answer(&packet, Ok(reply)))),
                     Err(Unreadable::Version(version)) => return Ok(Some(answer(&packet, Err(version)))),

@@ -34,7 +34,7 @@ pub enum Reply {
     Telemetry(Telemetry),
     /// The running and the stored model.
     Model(Blocks),
-    /// New faults; sent without a request, and again and again until the host has heard of them.
+    /// A new fault; sent without a request, and again and again until the host has heard of it.
     Fault(FaultReport),
     /// The running and the stored settings.
     Settings(Blocks),
@@ -50,18 +50,19 @@ pub enum Reply {
     Adaptation(AdaptationReport),
 }
 
-/// Report of the faults that have come since the start.
+/// Report of a fault that has come since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaultReport {
-    /// Number of faults since the start, this one included; it wraps around. The host names it when it has heard of them.
+    /// Number of faults since the start, this one included; it wraps around. Of several in one tick, the fault with the lowest
+    /// code comes first. The host names the number when it has heard of the fault.
     pub number: u32,
-    /// Tick in which the newest one was seen.
+    /// Tick in which the fault was seen.
     pub tick: u64,
-    /// The newest fault; of several in one tick the one with the lowest code.
+    /// The fault.
     pub fault: Fault,
-    /// All standing faults: bit 0 for the fault with code 1.
+    /// All faults that stand when the report is sent: bit 0 for the fault with code 1.
     pub standing: u16,
-    /// What disagreed with the output.
+    /// What disagreed with the output when the fault was seen.
     pub mismatch: Mismatch,
 }
 

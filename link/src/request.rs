@@ -53,7 +53,7 @@ pub enum Request {
     },
     /// Restarts the MCU with the stored model and settings. Rejected unless disarmed.
     Restart,
-    /// Informs the MCU that the report of faults with this number has arrived, so that it is not repeated. It acknowledges
+    /// Informs the MCU that the report of a fault with this number has arrived, so that it is not repeated. It acknowledges
     /// no fault.
     Heard {
         /// Number of the report, see [`crate::FaultReport::number`].

@@ -60,7 +60,7 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
         stopwatch.stop();
         if let Some(seen) = seen {
             exchanges += u32::from(seen.exchanged);
-            let change = planner.plan(&seen, tick);
+            let change = planner.plan(&seen, tick.into());
             gain = change.map_or(gain, |change| change.parameters.gain);
         }
         // The spring is the model but for its gain, and uniform noise of about 1 V.

@@ -37,8 +37,8 @@ impl Player {
 }
 
 impl Source for Player {
-    fn command(&mut self, tick: u32) -> Option<Command> {
-        let step = self.script.step(tick)?;
+    fn command(&mut self, tick: u64) -> Option<Command> {
+        let step = self.script.step((tick - self.script.first_tick()) as u32)?;
         INTERLOCK_CLOSED.store(step.interlock_closed, Ordering::Relaxed);
         if let Some(fault) = step.fault {
             inject(fault);

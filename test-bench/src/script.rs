@@ -9,6 +9,7 @@
 //! | `up-down sensor`, `up-down fast sensor`, `up-down robust sensor` | These runs with the spring's readings in the loop (feature `feedback`). |
 //! | `random SEED` | 100 000 ticks with random arming, disarming, targets, interlock openings and silences of the host. |
 //! | `hour SEED` | An hour of the same. |
+//! | `late SEED` | The random run on a board that has run for weeks: the low 32 bits of its ticks wrap in the middle of the run. |
 //! | `panic`, `hard-fault`, `stack-overflow`, `float-overflow`, `stall`, `hang`, `deaf`, `overrun`, `interlock`, `two-faults`, `silence`, `unguarded` | Drills: one injected fault each (`two-faults`: two), see [`FaultInjection`]. |
 //! | (after a reset by a fault) | The output must stay disabled until the fault is acknowledged. |
 
@@ -144,7 +145,7 @@ pub enum Script {
     Stair,
     /// Run `up-down` with this controller.
     UpDown(&'static Controller),
-    /// Run `random` or `hour`.
+    /// Run `random`, `hour` or `late`.
     Random(Random),
     /// Drill with this fault.
     Drill(FaultInjection),
@@ -163,8 +164,13 @@ impl Script {
         Self::random_ticks(seed, HOUR_TICKS)
     }
 
+    /// The random run with this seed on a board that has run for 49.7 days.
+    pub const fn late(seed: u32) -> Self {
+        Self::Random(Random { first_tick: (1 << 32) - (RANDOM_TICKS / 2) as u64, ..Random::new(seed, RANDOM_TICKS) })
+    }
+
     const fn random_ticks(seed: u32, ticks: u32) -> Self {
-        Self::Random(Random { ticks, numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 })
+        Self::Random(Random::new(seed, ticks))
     }
 
     /// The script with this name, see the table of this module; `None` if there is none.
@@ -181,6 +187,9 @@ impl Script {
         }
         if let Some(seed) = name.strip_prefix("hour ") {
             return seed.parse().ok().map(Self::hour);
+        }
+        if let Some(seed) = name.strip_prefix("late ") {
+            return seed.parse().ok().map(Self::late);
         }
         FaultInjection::ALL.into_iter().find(|fault| fault.name() == name).map(Self::Drill)
     }
@@ -204,7 +213,15 @@ impl Script {
         }
     }
 
-    /// Inputs of tick number `tick`; `None` after the last one. Must be called for every tick in order.
+    /// Number of ticks that the board has run before the first one of the script.
+    pub const fn first_tick(&self) -> u64 {
+        match self {
+            Self::Random(random) => random.first_tick,
+            Self::Stair | Self::UpDown(_) | Self::Drill(_) | Self::Aftermath => 0,
+        }
+    }
+
+    /// Inputs of tick number `tick` of the script; `None` after the last one. Must be called for every tick in order.
     pub fn step(&mut self, tick: u32) -> Option<Step> {
         if tick >= self.ticks() {
             return None;
@@ -281,12 +298,17 @@ fn aftermath(tick: u32) -> Option<supervisor::Command> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Random {
     ticks: u32,
+    first_tick: u64,
     numbers: Xorshift,
     open_until: u32,
     silent_until: u32,
 }
 
 impl Random {
+    const fn new(seed: u32, ticks: u32) -> Self {
+        Self { ticks, first_tick: 0, numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 }
+    }
+
     fn step(&mut self, tick: u32) -> Step {
         // Both numbers are drawn in every tick, so that the sequence does not depend on their use.
         let (event, value) = (self.numbers.draw() >> 16, self.numbers.draw());
@@ -324,6 +346,7 @@ mod tests {
         assert_eq!(Script::parse("random 7"), Some(Script::random(7)));
         assert_eq!(Script::parse("hour 7"), Some(Script::hour(7)));
         assert_eq!(Script::parse("stall\n"), Some(Script::Drill(FaultInjection::Stall)));
+        assert_eq!(Script::parse("late 7"), Some(Script::late(7)));
         assert_eq!(["random", "hour", "hour x", ""].map(Script::parse), [None; 4]);
     }
 

@@ -19,8 +19,9 @@ const TOOL: Tool = Tool { name: "cargo-mutants", version: "26.0.0" };
 const LEAST_CAUGHT: f64 = 0.95;
 /// The list of changes that live.
 const SURVIVORS: &str = ".cargo/mutants-survivors.toml";
-/// The folders of the packages whose tests run on a host and that the MCU runs, and their names.
-const PACKAGES: [(&str, &str); 3] = [("model", "vsj-model"), ("link", "vsj-link"), ("firmware", "firmware")];
+/// The packages whose tests run on a host and that the MCU runs: folder, name, and features beside the default ones.
+const PACKAGES: [(&str, &str, &str); 3] =
+    [("model", "vsj-model", ""), ("link", "vsj-link", ""), ("firmware", "firmware", "fast,robust,adaptation")];
 
 /// Arguments of `cargo test` in each pass. The first pass leaves out the unit tests that need most of the time.
 const PASSES: [&[&str]; 2] = [
@@ -32,7 +33,7 @@ const PASSES: [&[&str]; 2] = [
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Package whose code is changed; all three without it
-    #[arg(long, value_parser = PACKAGES.map(|(folder, _)| folder))]
+    #[arg(long, value_parser = PACKAGES.map(|(folder, ..)| folder))]
     package: Vec<String>,
     /// Only in files that match this pattern, for example 'model/src/extended/*'
     #[arg(long, value_name = "PATTERN")]
@@ -53,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let folder = shell::target_directory()?.join("mutants");
     let (mut all, mut unlisted) = (Counts::default(), Vec::new());
     let mut living = BTreeSet::new();
-    for (package, name) in PACKAGES.into_iter().filter(|(folder, _)| asked(folder)) {
+    for (package, name, features) in PACKAGES.into_iter().filter(|(folder, ..)| asked(folder)) {
         let out = folder.join(package);
         fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
         if args.iterate {
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             keep(&out, true)?;
         }
         for (tests, iterate) in PASSES.into_iter().zip([args.iterate, true]) {
-            try_changes(&program, args, name, tests, iterate, &out)?;
+            try_changes(&program, args, (name, features), tests, iterate, &out)?;
             keep(&out, iterate)?;
         }
         let outcomes = Outcomes::read(&out)?;
@@ -96,7 +97,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Runs the tool once. It exits with 2 or 3 when changes live, which is no failure here.
-fn try_changes(program: &Path, args: &Args, package: &str, tests: &[&str], iterate: bool, out: &Path) -> Result<()> {
+fn try_changes(
+    program: &Path,
+    args: &Args,
+    (package, features): (&str, &str),
+    tests: &[&str],
+    iterate: bool,
+    out: &Path,
+) -> Result<()> {
     let mut command = shell::command(program);
     command.args([
         "mutants",
@@ -107,6 +115,8 @@ fn try_changes(program: &Path, args: &Args, package: &str, tests: &[&str], itera
         "60",
         "--package",
         package,
+        "--features",
+        features,
     ]);
     command.arg(format!("--jobs={}", args.jobs)).args(tests).arg("--output").arg(out);
     args.file.iter().for_each(|file| _ = command.args(["--file", file]));

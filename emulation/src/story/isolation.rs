@@ -146,7 +146,7 @@ fn on_the_host(run: &str, moments: &[Moment], folder: &Path) -> Result<(Vec<Said
             let name = news.report.verdict.causes().0.map(|cause| cause.name().to_owned());
             said.push(Said {
                 tick,
-                since_tick: tick.saturating_sub(news.since_ticks),
+                since_tick: news.since_tick(tick.into()) as u32,
                 verdict: news.report.verdict.name().to_owned(),
                 cause: name.map(|name| Cause { name, size, high: size + half_width, explained }),
             });

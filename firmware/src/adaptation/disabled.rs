@@ -59,7 +59,7 @@ pub fn set_terms(_: Terms) {}
 
 /// Without the feature `adaptation` nothing is watched.
 #[inline(always)]
-pub fn after_tick(_: &mut Control, _: &mut Isolation, _: &Tick, _: u32) {}
+pub fn after_tick(_: &mut Control, _: &mut Isolation, _: &Tick, _: u64) {}
 
 /// Without the feature `adaptation` there is nothing to plan.
 pub fn serve(_: &mut Planner) {}

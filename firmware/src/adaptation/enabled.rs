@@ -60,7 +60,7 @@ pub struct Planner {
     state: State,
     reported: Change,
     /// Number of exchanges, and the last tick before the last of them.
-    exchanged: (u32, u32),
+    exchanged: (u32, u64),
     /// What is to be exchanged at the end of the next block.
     next: Option<Variant>,
 }
@@ -73,7 +73,7 @@ impl Planner {
     }
 
     /// Plans from what the block that ended with `tick` has shown. Returns what has changed; [`Planner::next`] is the plan.
-    pub fn plan(&mut self, seen: &Observation, tick: u32) -> Option<Change> {
+    pub fn plan(&mut self, seen: &Observation, tick: u64) -> Option<Change> {
         let Ok(Stored { control, settings, .. }) = &self.terms.0 else { return None };
         let block_s = bank::block_s(control.rate_hz);
         let next = self.state.update(settings, seen, control.plant, control.amplifier.max_v, block_s);
@@ -107,7 +107,7 @@ impl Planner {
             Err(why) => AdaptationReport::off(*why, 0),
             Ok(Stored { control, settings, .. }) => {
                 let Change { phase, parameters } = self.reported;
-                let (exchanges, exchange_tick) = (self.exchanged.0, self.exchanged.1.into());
+                let (exchanges, exchange_tick) = self.exchanged;
                 let report = AdaptationReport::new(phase, &parameters, settings, control.plant);
                 AdaptationReport { exchanges, exchange_tick, ..report }
             }
@@ -133,7 +133,7 @@ impl Planner {
 #[derive(Debug)]
 pub struct Alone {
     planner: Planner,
-    ticks: u32,
+    ticks: u64,
 }
 
 impl Alone {
@@ -149,7 +149,7 @@ impl Alone {
 
     /// After a tick of the bank: exchanges at the end of a block what was planned at the end of the last one. Returns what has changed.
     pub fn after_tick(&mut self, control: &mut Control, isolation: &mut Isolation, tick: &Tick) -> Option<Change> {
-        self.ticks = self.ticks.wrapping_add(1);
+        self.ticks += 1;
         if !isolation.ends_block(tick) {
             return None;
         }

@@ -13,6 +13,8 @@ mod disabled;
 mod enabled;
 #[cfg(all(feature = "adaptation", feature = "mcu"))]
 mod shared;
+#[cfg(all(feature = "adaptation", test))]
+mod tests;
 
 #[cfg(not(feature = "adaptation"))]
 pub use disabled::*;

@@ -25,7 +25,7 @@ static SWITCH: Mutex<CriticalSectionRawMutex, Cell<Option<bool>>> = Mutex::new(C
 /// What the adaptation does; `None` before the housekeeping task has begun.
 static LATEST: Mutex<CriticalSectionRawMutex, Cell<Option<AdaptationReport>>> = Mutex::new(Cell::new(None));
 /// What the last block has shown, and its last tick.
-static SEEN: Mutex<CriticalSectionRawMutex, Cell<Option<(Observation, u32)>>> = Mutex::new(Cell::new(None));
+static SEEN: Mutex<CriticalSectionRawMutex, Cell<Option<(Observation, u64)>>> = Mutex::new(Cell::new(None));
 /// What is exchanged at the end of the present block.
 static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Variant>>> = Mutex::new(RefCell::new(None));
 
@@ -50,7 +50,7 @@ impl Planner {
 /// After the bank's tick number `number`: at the end of a block, exchanges what was planned and shows what the block has shown. No float,
 /// no panic: not inlined, so that the audit of the image verifies it.
 #[inline(never)]
-pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick, number: u32) {
+pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick, number: u64) {
     if !isolation.ends_block(tick) {
         return;
     }
@@ -70,7 +70,7 @@ pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick,
 pub fn serve(planner: &mut Planner) {
     if let Some(on) = SWITCH.lock(Cell::get) {
         if let Some(change) = planner.switch(on) {
-            log::adaptation(&change, stop::TICK.load(Ordering::Relaxed));
+            log::adaptation(&change, stop::TICK.load(Ordering::Relaxed).into());
         }
         planner.publish();
         SWITCH.lock(|cell| cell.set(None));

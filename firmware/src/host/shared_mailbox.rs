@@ -49,6 +49,7 @@ pub(super) async fn hand_over(command: Command, state: State) -> View {
 pub struct Host {
     state: State,
     took_command: bool,
+    /// Number of ticks since the start, the present one included.
     tick: u64,
 }
 
@@ -60,7 +61,8 @@ impl Host {
 }
 
 impl Source for Host {
-    fn command(&mut self, _tick: u32) -> Option<Command> {
+    fn command(&mut self, tick: u64) -> Option<Command> {
+        self.tick = tick + 1;
         let (command, taken) = with_mailbox(|mailbox| mailbox.take(self.state));
         self.took_command = taken;
         Some(command)
@@ -69,7 +71,6 @@ impl Source for Host {
     fn done(&mut self, tick: &Tick, control: &Control, overruns: u32) {
         let supervisor = control.supervisor();
         self.state = supervisor.state();
-        self.tick += 1;
         let output = &tick.output;
         let sample = Telemetry {
             tick: self.tick,

@@ -79,9 +79,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
     }
 }
 
-/// Sends the report of new faults, ahead of everything else.
+/// Sends the reports of faults that are due, at most one for each code of a fault, ahead of everything else.
 async fn report_faults(line: &mut impl Line, server: &mut Server, view: &View) {
-    if let Some(bytes) = server.fault(view) {
+    while let Some(bytes) = server.fault(view) {
         send(line, bytes).await;
     }
 }

@@ -74,9 +74,16 @@ pub struct News {
     /// What it says now.
     pub report: Report,
     /// For how many ticks the fault has been there; 0 without an alarm.
-    pub since_ticks: u32,
+    pub since_ticks: u64,
     /// The verdict before.
     pub before: Verdict,
+}
+
+impl News {
+    /// The tick after which the fault has been there, for news of `tick`; `tick` itself without an alarm.
+    pub const fn since_tick(&self, tick: u64) -> u64 {
+        tick.saturating_sub(self.since_ticks)
+    }
 }
 
 /// Voltage and model of one tick, with which the reading of the next tick is compared.
@@ -163,7 +170,8 @@ impl Isolation {
         }
         let (before, ..) = core::mem::replace(&mut self.reported, says);
         let report = self.state.report();
-        Some(News { report, since_ticks: report.since_blocks.saturating_mul(config.block_ticks()), before })
+        let since_ticks = u64::from(report.since_blocks) * u64::from(config.block_ticks());
+        Some(News { report, since_ticks, before })
     }
 
     /// Ends an alarm: the bank looks for a fault anew.

@@ -14,6 +14,8 @@ mod disabled;
 mod enabled;
 #[cfg(all(feature = "isolation", feature = "mcu"))]
 mod shared;
+#[cfg(all(feature = "isolation", test))]
+pub(crate) mod tests;
 
 #[cfg(not(feature = "isolation"))]
 pub use disabled::*;

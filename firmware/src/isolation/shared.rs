@@ -27,7 +27,7 @@ pub fn set_terms(terms: Terms) {
 
 /// Publishes what has changed in a tick, counted from the start.
 pub fn publish(news: &News, tick: u64) {
-    let since_tick = if news.since_ticks == 0 { 0 } else { tick.saturating_sub(news.since_ticks.into()) };
+    let since_tick = if news.since_ticks == 0 { 0 } else { news.since_tick(tick) };
     LATEST.lock(|cell| cell.set(Some((news.report, since_tick))));
 }
 

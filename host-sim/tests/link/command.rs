@@ -127,6 +127,21 @@ fn the_voltage_ramps_down_once_the_host_is_silent() {
 }
 
 #[test]
+fn two_faults_of_one_tick_are_both_reported_and_heard_of() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    let kept = start(port, &["set", "100", "--arm", "--keep", "inf"]);
+    mcu.wait_for(State::Armed);
+    mcu.with(|shared| (shared.interlock_open, shared.fault) = (true, Some(supervisor::Fault::Watchdog)));
+    let remarks = String::from_utf8(kept.wait_with_output().unwrap().stderr).unwrap();
+    let again = bad(1, port, &["arm"]);
+    for report in ["fault interlock (4) at tick ", "fault watchdog (5) at tick "] {
+        assert_eq!(remarks.matches(report).count(), 1, "{report}: {remarks}");
+        assert!(!again.contains(report), "it was heard of: {again}");
+    }
+}
+
+#[test]
 fn an_open_interlock_and_its_fault() {
     let mcu = Mcu::on_socket(Setup::default());
     let port = &mcu.port;

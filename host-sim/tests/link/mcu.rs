@@ -221,7 +221,7 @@ impl Mcu {
                 for byte in &bytes[..count] {
                     chip.hear(*byte, &mut out);
                 }
-                out.extend_from_slice(chip.server.fault(&chip.view).unwrap_or_default());
+                chip.report_faults(&mut out);
                 out.extend_from_slice(chip.server.telemetry(&chip.view).unwrap_or_default());
             }
         }));
@@ -321,12 +321,18 @@ impl Chip {
         self.view = View { sample, state, standing, refusal: supervisor.refusal(), overruns: 0 };
     }
 
+    fn report_faults(&mut self, out: &mut Vec<u8>) {
+        while let Some(bytes) = self.server.fault(&self.view) {
+            out.extend_from_slice(bytes);
+        }
+    }
+
     fn hear(&mut self, byte: u8, out: &mut Vec<u8>) {
         match self.server.on_byte(byte, &self.view) {
             Some(Step::Command(command)) => {
                 self.shared.lock().unwrap().ordered.push(command);
                 self.tick(Command { heard: true, ..command });
-                out.extend_from_slice(self.server.fault(&self.view).unwrap_or_default());
+                self.report_faults(out);
                 out.extend_from_slice(self.server.command_done(&self.view));
             }
             Some(Step::Send(bytes)) => out.extend_from_slice(bytes),

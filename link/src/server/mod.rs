@@ -9,7 +9,7 @@
 //!    returns. [`Step::Capture`], [`Step::Isolation`], [`Step::Adaptation`]: send what
 //!    [`Server::answered`] returns. [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
-//! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns.
+//! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns until it returns `None`.
 //! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed.
 //!
 //! A reply reports the result of the request because it is built from the view after the tick.
@@ -228,14 +228,15 @@ impl Server {
         self.session.answer(reply)
     }
 
-    /// The report of faults to send ahead of everything else, if one is due: immediately after a new fault, then ten times per
-    /// second until the host has heard of it. Nothing is due before the first session.
+    /// The next report of a fault to send ahead of everything else, if one is due: immediately after the fault, then ten times
+    /// per second until the host has heard of it. Each call for a view returns another one, at most one for each code of a
+    /// fault, then `None`. Nothing is due before the first session.
     pub fn fault(&mut self, view: &View) -> Option<&[u8]> {
         self.reports.see(view);
         if !self.session.has_begun() {
             return None;
         }
-        let report = self.reports.due(view.sample.tick, u64::from(self.about.rate_hz / 10))?;
+        let report = self.reports.due(view.sample.tick, u64::from(self.about.rate_hz / 10).max(1))?;
         Some(self.session.report(report))
     }
 

@@ -1,58 +1,68 @@
 //! Reports of faults: each new fault is sent ahead of everything else, and again until the host has heard of it.
 
-use model::supervisor::Faults;
+use model::supervisor::{self, Faults};
 
 use super::View;
-use crate::diagnosis::Mismatch;
-use crate::fault::Fault;
 use crate::reply::FaultReport;
 
-/// The faults that were seen, and what the host has heard of them.
+/// The faults that were seen, and those of which the host has not heard.
 #[derive(Clone, Debug)]
 pub(super) struct Reports {
     standing: Faults,
-    latest: FaultReport,
-    /// Number of the last report that the host has heard.
-    heard: u32,
+    /// Number of faults since the start; it wraps around.
+    number: u32,
+    /// The reports of which the host has not heard, in the order of the faults' codes. A fault replaces no report but its own
+    /// earlier one, and comes again only after the host has acknowledged it by its code.
+    unheard: [Option<Unheard>; supervisor::Fault::ALL.len()],
+}
+
+/// A report of which the host has not heard.
+#[derive(Clone, Copy, Debug)]
+struct Unheard {
+    report: FaultReport,
+    /// Tick in which it was sent last.
     sent_at: Option<u64>,
 }
 
 impl Reports {
     /// No fault was seen yet.
-    pub(super) const NEW: Self = Self {
-        standing: Faults::NONE,
-        latest: FaultReport { number: 0, tick: 0, fault: Fault::NONE, standing: 0, mismatch: Mismatch(0) },
-        heard: 0,
-        sent_at: None,
-    };
+    pub(super) const NEW: Self =
+        Self { standing: Faults::NONE, number: 0, unheard: [None; supervisor::Fault::ALL.len()] };
 
     /// Takes the faults that stand after a tick. It has to see the tick in which a fault was acknowledged, so that the same
     /// one is a new fault when it comes again.
     pub(super) fn see(&mut self, view: &View) {
         let new = view.standing.except(self.standing);
         self.standing = view.standing;
-        self.latest.standing = view.standing.bits();
-        if let Some(fault) = new.iter().next() {
-            let number = self.latest.number.wrapping_add(new.iter().count() as u32);
-            let (tick, mismatch) = (view.sample.tick, view.sample.mismatch);
-            self.latest = FaultReport { number, tick, fault: fault.into(), mismatch, ..self.latest };
-            self.sent_at = None;
+        for fault in new.iter() {
+            self.number = self.number.wrapping_add(1);
+            let report = FaultReport {
+                number: self.number,
+                tick: view.sample.tick,
+                fault: fault.into(),
+                standing: self.standing.bits(),
+                mismatch: view.sample.mismatch,
+            };
+            if let Some(place) = self.unheard.get_mut(usize::from(fault.code() - 1)) {
+                *place = Some(Unheard { report, sent_at: None });
+            }
         }
     }
 
-    /// The report to send at tick `now`, at most every `interval` ticks; `None` if the host has heard of every fault.
+    /// The oldest of the reports to send at tick `now`, each at most every `interval` ticks, with the faults that stand now;
+    /// `None` if none is due.
     pub(super) fn due(&mut self, now: u64, interval: u64) -> Option<FaultReport> {
-        let due = self.latest.number != self.heard && self.sent_at.is_none_or(|at| now.saturating_sub(at) >= interval);
-        if due {
-            self.sent_at = Some(now);
-        }
-        due.then_some(self.latest)
+        let due = |unheard: &&mut Unheard| unheard.sent_at.is_none_or(|at| now.saturating_sub(at) >= interval);
+        let age = |unheard: &&mut Unheard| self.number.wrapping_sub(unheard.report.number);
+        let oldest = self.unheard.iter_mut().flatten().filter(due).max_by_key(age)?;
+        oldest.sent_at = Some(now);
+        Some(FaultReport { standing: self.standing.bits(), ..oldest.report })
     }
 
-    /// Ends the repetition if `number` is that of the latest report.
+    /// Ends the repetition of the report with this number.
     pub(super) fn hear(&mut self, number: u32) {
-        if number == self.latest.number {
-            self.heard = number;
+        for place in &mut self.unheard {
+            *place = place.filter(|unheard| unheard.report.number != number);
         }
     }
 }
@@ -61,34 +71,80 @@ impl Reports {
 mod tests {
     use super::*;
     use crate::telemetry::Telemetry;
-    use model::supervisor::{self, State};
+    use model::supervisor::{Fault, State};
+    use std::vec::Vec;
 
-    fn view(tick: u64, fault: Option<supervisor::Fault>) -> View {
+    fn view(tick: u64, faults: &[Fault]) -> View {
         View {
             sample: Telemetry { tick, ..Telemetry::default() },
-            state: fault.map_or(State::Disarmed, State::Faulted),
-            standing: fault.map_or(Faults::NONE, |fault| Faults::NONE.with(fault)),
+            state: faults.first().map_or(State::Disarmed, |fault| State::Faulted(*fault)),
+            standing: faults.iter().copied().fold(Faults::NONE, Faults::with),
             refusal: None,
             overruns: 0,
         }
     }
 
+    /// Number and fault of each report that is sent at tick `now`.
+    fn sent(reports: &mut Reports, now: u64) -> Vec<(u32, u8)> {
+        core::iter::from_fn(|| reports.due(now, 5)).map(|report| (report.number, report.fault.0)).collect()
+    }
+
     #[test]
     fn every_fault_is_reported_and_heard_across_the_wrap_of_its_number() {
         let before = u32::MAX - 3;
-        let mut reports = Reports::NEW;
-        (reports.latest.number, reports.heard) = (before, before);
+        let mut reports = Reports { number: before, ..Reports::NEW };
         for step in 1..=8 {
             let now = 10 * u64::from(step);
             let number = before.wrapping_add(step);
-            reports.see(&view(now, Some(supervisor::Fault::Interlock)));
-            assert_eq!(reports.due(now, 5).map(|report| report.number), Some(number), "reported");
+            reports.see(&view(now, &[Fault::Interlock]));
+            assert_eq!(sent(&mut reports, now), [(number, 4)], "reported");
             reports.hear(number.wrapping_sub(1));
             assert_eq!(reports.due(now + 4, 5), None, "not yet again");
             assert!(reports.due(now + 5, 5).is_some(), "an earlier number does not end the repetition");
             reports.hear(number);
             assert_eq!(reports.due(now + 10, 5), None, "heard");
-            reports.see(&view(now + 1, None));
+            reports.see(&view(now + 1, &[]));
         }
+    }
+
+    #[test]
+    fn a_report_that_nobody_has_heard_outlives_its_fault_and_every_later_one() {
+        // The numbers wrap around between the faults.
+        let mut reports = Reports { number: u32::MAX - 1, ..Reports::NEW };
+        reports.see(&view(1, &[Fault::Monitor]));
+        assert_eq!(sent(&mut reports, 1), [(u32::MAX, 6)]);
+        reports.see(&view(2, &[]));
+        // Three in one tick, of which one has the lowest code of all.
+        reports.see(&view(3, &[Fault::Panic, Fault::Interlock, Fault::Watchdog]));
+        assert_eq!(sent(&mut reports, 3), [(0, 1), (1, 4), (2, 5)], "the new ones do not wait");
+        assert_eq!(sent(&mut reports, 6), [(u32::MAX, 6)], "the first one is still sent, with its own tick");
+        assert_eq!(sent(&mut reports, 8), [(0, 1), (1, 4), (2, 5)]);
+        reports.hear(1);
+        assert_eq!(sent(&mut reports, 20), [(u32::MAX, 6), (0, 1), (2, 5)], "the oldest first");
+        // The monitor fault has been acknowledged and comes again: its earlier report is the only one that is replaced.
+        reports.see(&view(21, &[Fault::Panic, Fault::Watchdog, Fault::Monitor]));
+        assert_eq!(sent(&mut reports, 25), [(0, 1), (2, 5), (3, 6)]);
+        for number in [u32::MAX, 0, 2, 3] {
+            reports.hear(number);
+        }
+        assert_eq!(sent(&mut reports, 100), []);
+    }
+
+    #[test]
+    fn a_report_has_its_own_tick_and_mismatch_and_the_faults_that_stand_when_it_is_sent() {
+        let mut reports = Reports::NEW;
+        let mut first = view(7, &[Fault::Monitor]);
+        first.sample.mismatch = crate::Mismatch(3);
+        reports.see(&first);
+        reports.see(&view(9, &[Fault::Monitor, Fault::Supply]));
+        let sent: Vec<_> = core::iter::from_fn(|| reports.due(9, 5)).collect();
+        let expected = |number, tick, fault: Fault, mismatch| FaultReport {
+            number,
+            tick,
+            fault: fault.into(),
+            standing: 0xa0,
+            mismatch: crate::Mismatch(mismatch),
+        };
+        assert_eq!(sent, [expected(1, 7, Fault::Monitor, 3), expected(2, 9, Fault::Supply, 0)]);
     }
 }

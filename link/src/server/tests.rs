@@ -274,11 +274,39 @@ fn a_report_of_a_fault_is_repeated_until_the_host_has_heard_of_it() {
     for tick in 1008..3000 {
         assert_eq!(sent(&mut server, tick), None, "{tick}");
     }
-    // A second fault is reported immediately, with both.
+    // A second fault is reported immediately, with both that stand.
     let both = View { standing: Faults::NONE.with(Cause::Monitor).with(Cause::Watchdog), ..FAULTED };
     let Some(Reply::Fault(second)) = server.fault(&at(3000, both)).map(reply) else { panic!() };
     assert_eq!((second.number, second.fault, second.standing), (3, Cause::Watchdog.into(), 0x30));
     assert!(second.faults().eq([Fault::from(Cause::Watchdog), Cause::Monitor.into()]));
+}
+
+/// Every fault comes while nobody hears: each is reported, at any rate of the ticks.
+#[test]
+fn a_later_fault_does_not_replace_a_report_that_nobody_has_heard() {
+    for rate_hz in [1, 1000] {
+        let mut server = server();
+        server.about.rate_hz = rate_hz;
+        let nonce = greet(&mut server, &DISARMED);
+        send(&mut server, &DISARMED, nonce, 1, Request::Status);
+        let mut standing = Faults::NONE;
+        let mut view = FAULTED;
+        for (tick, fault) in (10..).zip(Cause::ALL) {
+            standing = standing.with(fault);
+            view = View { standing, ..at(tick, FAULTED) };
+            let first = server.fault(&view).map(reply);
+            assert!(matches!(first, Some(Reply::Fault(report)) if report.standing == standing.bits()), "{first:?}");
+        }
+        // Once each in a later tick, and no more: the loop of the task that sends them ends.
+        let mut repeated = std::vec::Vec::new();
+        let later = at(view.sample.tick + 100, view);
+        while let Some(bytes) = server.fault(&later) {
+            let Reply::Fault(report) = reply(bytes) else { panic!() };
+            repeated.push((report.number, report.tick, report.fault.0));
+        }
+        let expected = Cause::ALL.map(|fault| (u32::from(fault.code()), 9 + u64::from(fault.code()), fault.code()));
+        assert_eq!(repeated, expected, "{rate_hz} Hz");
+    }
 }
 
 /// The acknowledged fault comes again before the next poll of the link: it is a new one.

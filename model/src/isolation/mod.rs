@@ -429,7 +429,7 @@ impl Config {
         if highest >= self.alarm {
             state.alarmed = true;
         }
-        state.since_decision += 1;
+        state.since_decision = state.since_decision.saturating_add(1);
         state.mode = products::Mode {
             fresh: state.blocks as usize == state.held,
             halve: state.blocks >= bank::MOST_BLOCKS,

@@ -273,3 +273,13 @@ fn every_tick_is_the_same_to_the_bit() {
         assert_eq!(all, digest, "{rate_hz} Hz: {all:#x}");
     }
 }
+
+#[test]
+fn counters_at_their_ends_stay_there() {
+    let config = config(1000.0);
+    let mut state = State { age: u32::MAX, since_decision: u32::MAX, ..State::NEW };
+    // Between the level at which the sums restart and that of an alarm nothing resets them.
+    state.tests.highest = config.restart;
+    config.assess(&mut state);
+    assert_eq!((state.age, state.since_decision), (u32::MAX, u32::MAX));
+}

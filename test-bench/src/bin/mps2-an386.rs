@@ -124,6 +124,7 @@ fn main() -> ! {
     }
     match mode {
         Mode::Play(script) => {
+            let timing = timing.counted_from(script.first_tick());
             if let Ok(control) = play(board, control, isolation, script, timing) {
                 high.spawn(control);
             }
@@ -157,7 +158,7 @@ async fn play(
     let mut player = Player::new(script);
     let mut counter = Counter::begin();
     let (ticks, missed) = tasks::control(&mut board, control, isolation, &mut player, &mut counter, timing).await;
-    DONE.signal(Done { ticks, missed, digest: player.digest(), instructions: counter.instructions() });
+    DONE.signal(Done { ticks: ticks as u32, missed, digest: player.digest(), instructions: counter.instructions() });
 }
 
 #[embassy_executor::task]
