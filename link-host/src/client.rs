@@ -236,16 +236,16 @@ mod tests {
     use link::{About, Part, Server, Step, View};
     use model::Spring;
     use model::stiffness::{Cantilever, YoungsModulus};
-    use model::supervisor::{Faults, State};
+    use model::supervisor::{Fault, Faults, State};
     use std::io::{Read, Write};
     use std::os::unix::net::UnixListener;
     use std::thread::JoinHandle;
 
-    /// A disarmed MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange. The
-    /// settings have no end.
-    fn mcu(listener: UnixListener) -> Counters {
+    /// An MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange, at a rate at
+    /// which reports of faults are repeated in each. `standing` is the faults that stand in a tick. The settings have no end.
+    fn mcu(listener: UnixListener, standing: fn(u64) -> Faults) -> Counters {
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-        let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 1000, ..About::default() });
+        let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 10, ..About::default() });
         let mut sample = Telemetry::default();
         let (mut stream, _) = listener.accept().unwrap();
         let mut bytes = [0; 256];
@@ -255,7 +255,11 @@ mod tests {
                 return server.counters();
             }
             sample.tick += 1;
-            let view = View { sample, state: State::Disarmed, standing: Faults::NONE, refusal: None, overruns: 0 };
+            let standing = standing(sample.tick);
+            let view = View { sample, state: State::Disarmed, standing, refusal: None, overruns: 0 };
+            while let Some(report) = server.fault(&view) {
+                stream.write_all(report).unwrap();
+            }
             for byte in &bytes[..count] {
                 match server.on_byte(*byte, &view) {
                     Some(Step::Send(answer)) => stream.write_all(answer).unwrap(),
@@ -270,19 +274,19 @@ mod tests {
         }
     }
 
-    /// A client of an MCU, and its thread.
-    fn connected() -> (Client, JoinHandle<Counters>) {
+    /// A client of an MCU with these faults, and its thread.
+    fn connected(standing: fn(u64) -> Faults) -> (Client, JoinHandle<Counters>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mcu");
         let listener = UnixListener::bind(&path).unwrap();
-        let thread = std::thread::spawn(move || mcu(listener));
+        let thread = std::thread::spawn(move || mcu(listener, standing));
         let port = Port::open(&format!("unix:{}", path.display()), 115_200, Duration::from_secs(1)).unwrap();
         (Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap().0, thread)
     }
 
     #[test]
     fn settings_with_more_parts_than_there_are_numbers_are_of_an_unknown_format() {
-        let (mut client, thread) = connected();
+        let (mut client, thread) = connected(|_| Faults::NONE);
         let failure = client.read_settings(true).unwrap_err();
         assert!(matches!(failure, Failure::UnknownSettings), "{failure}");
         drop(client);
@@ -291,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_client_whose_numbers_run_out_begins_another_session_and_keeps_its_telemetry() {
-        let (mut client, thread) = connected();
+        let (mut client, thread) = connected(|_| Faults::NONE);
         let first = client.session;
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.requests = MOST_REQUESTS;
@@ -306,5 +310,25 @@ mod tests {
         drop(client);
         let counters = thread.join().unwrap();
         assert_eq!((counters.out_of_order, counters.unknown), (0, 0));
+    }
+
+    /// Between a report and the answer to its Heard the MCU repeats it, also with other faults that stand by then.
+    #[test]
+    fn each_fault_is_shown_once_however_often_its_report_is_repeated() {
+        let (mut client, thread) = connected(|tick| match tick {
+            0..10 => Faults::NONE,
+            10 => Faults::NONE.with(Fault::Interlock).with(Fault::Watchdog),
+            11..20 => Faults::NONE.with(Fault::Watchdog),
+            // The interlock opens a second time.
+            _ => Faults::NONE.with(Fault::Watchdog).with(Fault::Interlock),
+        });
+        let mut shown = Vec::new();
+        for _ in 0..40 {
+            client.order(Request::Heartbeat).unwrap();
+            shown.extend(client.reports().iter().map(|report| (report.number, report.tick, report.fault.0)));
+        }
+        assert_eq!(shown, [(1, 10, 4), (2, 10, 5), (3, 20, 4)]);
+        drop(client);
+        thread.join().unwrap();
     }
 }
