@@ -3,31 +3,43 @@
 use model::supervisor::{self, Faults};
 
 use super::View;
+use crate::Mismatch;
 use crate::reply::FaultReport;
 
-/// The faults that were seen, and those of which the host has not heard.
+/// Number of faults that there are.
+const FAULTS: usize = supervisor::Fault::ALL.len();
+
+/// The faults that were seen, and the reports of which the host has not heard: at most one of each fault, in the order of the faults'
+/// codes. A fault replaces no report but its own earlier one, and comes again only after the host has acknowledged it by its code.
 #[derive(Clone, Debug)]
 pub(super) struct Reports {
     standing: Faults,
+    /// The faults of whose report the host has not heard.
+    unheard: Faults,
+    /// Those of them whose report is still to be sent in this round.
+    unsent: Faults,
     /// Number of faults since the start; it wraps around.
     number: u32,
-    /// The reports of which the host has not heard, in the order of the faults' codes. A fault replaces no report but its own
-    /// earlier one, and comes again only after the host has acknowledged it by its code.
-    unheard: [Option<Unheard>; supervisor::Fault::ALL.len()],
-}
-
-/// A report of which the host has not heard.
-#[derive(Clone, Copy, Debug)]
-struct Unheard {
-    report: FaultReport,
-    /// Tick in which it was sent last.
-    sent_at: Option<u64>,
+    /// Tick in which the round began.
+    round_at: u64,
+    // Arrays of each part of a report: an array of reports would take half as much RAM again.
+    ticks: [u64; FAULTS],
+    numbers: [u32; FAULTS],
+    mismatches: [Mismatch; FAULTS],
 }
 
 impl Reports {
     /// No fault was seen yet.
-    pub(super) const NEW: Self =
-        Self { standing: Faults::NONE, number: 0, unheard: [None; supervisor::Fault::ALL.len()] };
+    pub(super) const NEW: Self = Self {
+        standing: Faults::NONE,
+        unheard: Faults::NONE,
+        unsent: Faults::NONE,
+        number: 0,
+        round_at: 0,
+        ticks: [0; FAULTS],
+        numbers: [0; FAULTS],
+        mismatches: [Mismatch(0); FAULTS],
+    };
 
     /// Takes the faults that stand after a tick. It has to see the tick in which a fault was acknowledged, so that the same
     /// one is a new fault when it comes again.
@@ -36,35 +48,49 @@ impl Reports {
         self.standing = view.standing;
         for fault in new.iter() {
             self.number = self.number.wrapping_add(1);
-            let report = FaultReport {
-                number: self.number,
-                tick: view.sample.tick,
-                fault: fault.into(),
-                standing: self.standing.bits(),
-                mismatch: view.sample.mismatch,
-            };
-            if let Some(place) = self.unheard.get_mut(usize::from(fault.code() - 1)) {
-                *place = Some(Unheard { report, sent_at: None });
-            }
+            let place = place(fault);
+            self.ticks[place] = view.sample.tick;
+            self.numbers[place] = self.number;
+            self.mismatches[place] = view.sample.mismatch;
+            self.unheard = self.unheard.with(fault);
+            self.unsent = self.unsent.with(fault);
         }
     }
 
-    /// The oldest of the reports to send at tick `now`, each at most every `interval` ticks, with the faults that stand now;
-    /// `None` if none is due.
+    /// The oldest of the reports to send at tick `now`, with the faults that stand now; `None` if none is due. A new report is sent in the
+    /// present round, and every one again in the next, `interval` ticks later.
     pub(super) fn due(&mut self, now: u64, interval: u64) -> Option<FaultReport> {
-        let due = |unheard: &&mut Unheard| unheard.sent_at.is_none_or(|at| now.saturating_sub(at) >= interval);
-        let age = |unheard: &&mut Unheard| self.number.wrapping_sub(unheard.report.number);
-        let oldest = self.unheard.iter_mut().flatten().filter(due).max_by_key(age)?;
-        oldest.sent_at = Some(now);
-        Some(FaultReport { standing: self.standing.bits(), ..oldest.report })
+        if self.unsent == Faults::NONE && now.saturating_sub(self.round_at) >= interval {
+            self.unsent = self.unheard;
+        }
+        if self.unsent == self.unheard {
+            self.round_at = now;
+        }
+        let age = |fault: &supervisor::Fault| self.number.wrapping_sub(self.numbers[place(*fault)]);
+        let fault = self.unsent.iter().max_by_key(age)?;
+        self.unsent = self.unsent.without(fault);
+        let place = place(fault);
+        Some(FaultReport {
+            number: self.numbers[place],
+            tick: self.ticks[place],
+            fault: fault.into(),
+            standing: self.standing.bits(),
+            mismatch: self.mismatches[place],
+        })
     }
 
     /// Ends the repetition of the report with this number.
     pub(super) fn hear(&mut self, number: u32) {
-        for place in &mut self.unheard {
-            *place = place.filter(|unheard| unheard.report.number != number);
+        for fault in self.unheard.iter().filter(|fault| self.numbers[place(*fault)] == number) {
+            self.unheard = self.unheard.without(fault);
+            self.unsent = self.unsent.without(fault);
         }
     }
+}
+
+/// Returns the place of a fault's report.
+fn place(fault: supervisor::Fault) -> usize {
+    usize::from(fault.code() - 1) % FAULTS
 }
 
 #[cfg(test)]
@@ -117,12 +143,14 @@ mod tests {
         // Three in one tick, of which one has the lowest code of all.
         reports.see(&view(3, &[Fault::Panic, Fault::Interlock, Fault::Watchdog]));
         assert_eq!(sent(&mut reports, 3), [(0, 1), (1, 4), (2, 5)], "the new ones do not wait");
-        assert_eq!(sent(&mut reports, 6), [(u32::MAX, 6)], "the first one is still sent, with its own tick");
-        assert_eq!(sent(&mut reports, 8), [(0, 1), (1, 4), (2, 5)]);
+        assert_eq!(sent(&mut reports, 5), [], "not yet again");
+        assert_eq!(sent(&mut reports, 6), [(u32::MAX, 6), (0, 1), (1, 4), (2, 5)], "the first one is still sent");
+        assert_eq!(sent(&mut reports, 10), [], "not yet again");
         reports.hear(1);
         assert_eq!(sent(&mut reports, 20), [(u32::MAX, 6), (0, 1), (2, 5)], "the oldest first");
         // The monitor fault has been acknowledged and comes again: its earlier report is the only one that is replaced.
         reports.see(&view(21, &[Fault::Panic, Fault::Watchdog, Fault::Monitor]));
+        assert_eq!(sent(&mut reports, 21), [(3, 6)]);
         assert_eq!(sent(&mut reports, 25), [(0, 1), (2, 5), (3, 6)]);
         for number in [u32::MAX, 0, 2, 3] {
             reports.hear(number);
