@@ -67,11 +67,9 @@ impl Effect for VoltageDependentTimeConstant {
             point.extend(by_state(form).then_some(context.data.normalisation.share));
             point
         };
-        let starts: &[(f64, f64)] = match form == BY_DIRECTION || by_state(form) {
-            // Each takes several simulations.
-            true if context.data.initial_state_unknown => &INITIAL_TIME_CONSTANTS_S[2..4],
-            _ => &INITIAL_TIME_CONSTANTS_S,
-        };
+        // Where the prediction is not linear in an unknown initial state, each start takes several simulations.
+        let is_costly = context.data.initial_state_unknown && (form == BY_DIRECTION || by_state(form));
+        let starts = if is_costly { &INITIAL_TIME_CONSTANTS_S[2..4] } else { &INITIAL_TIME_CONSTANTS_S[..] };
         starts.iter().copied().map(start).collect()
     }
 

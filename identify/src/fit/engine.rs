@@ -12,10 +12,9 @@ use crate::fit::budget::{Budget, UNLIMITED};
 use crate::fit::known::Known;
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
-use crate::fit::start::Start;
 use crate::noise::{Noise, Term};
 use crate::plant::base::Base;
-use crate::plant::initial_state;
+use crate::plant::initial_state::{self, Start};
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
@@ -211,22 +210,22 @@ impl<'a> Engine<'a> {
         } else {
             self.simulator.run(model, &mut self.predicted);
         }
-        let truncation_v = self.observed.truncation_v;
-        let left = |(reading, predicted): (&f64, &f64)| reading + truncation_v - predicted;
-        let mut residual: Vec<f64> = self.data.reading.iter().zip(&self.predicted).map(left).collect();
-        let exact = |row: usize| counts(row) && self.observed.kinds[row] == Kind::Exact;
+        let observed = self.observed;
+        let exact = |row: usize| counts(row) && observed.is_exact(row);
         if estimated && !self.simulator.is_linear_in_start() {
-            let Some(Start { start_v, residual, .. }) = self.start_by(model, exact) else { return (residual, 0.0) };
+            let Some(Start { start_v, residual, .. }) = self.start_by(model, exact) else {
+                return (self.residual_from_rest(model), 0.0);
+            };
             let cost = initial_state::cost(&start_v, self.data.full_scale_v, residual.len());
             return (residual, cost);
         }
+        let mut residual = self.residual_of_predicted();
         let initial_state_cost = match estimated {
             true => initial_state::subtract_estimate(&mut residual, &self.kernels, self.data.full_scale_v, exact),
             false => 0.0,
         };
         let states = if self.has_kernels() { self.kernels.len() as u64 } else { 0 };
-        let of_row = work::RESIDUAL + work::INITIAL_STATE * states;
-        self.budget.spend(self.simulator.take_work() + of_row * residual.len() as u64);
+        self.budget.spend(work::INITIAL_STATE * states * residual.len() as u64);
         (residual, initial_state_cost)
     }
 

@@ -6,8 +6,7 @@
 
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, work};
-use crate::plant::initial_state::{self, Estimate};
-use crate::record::observed::Kind;
+use crate::plant::initial_state::{self, Estimate, Start};
 
 /// Gauss-Newton steps from rest, and from an estimate at a similar model.
 const STEPS_FROM_REST: usize = 3;
@@ -15,22 +14,8 @@ const STEPS_NEAR: usize = 2;
 /// Smallest step after which another is taken, relative to the full scale.
 const SMALL_STEP: f64 = 1e-3;
 
-/// The estimate at a model, of a single record.
-pub(super) struct Start {
-    /// Offset of each kernel's state, in V.
-    pub(super) start_v: Vec<f64>,
-    /// How it follows a change of the residual.
-    pub(super) estimate: Estimate,
-    /// Change of the prediction at each row for each state that is 1 V higher.
-    pub(super) kernels: Vec<Vec<f64>>,
-    /// Reading minus prediction from there, in V.
-    pub(super) residual: Vec<f64>,
-    /// True if the prediction is linear in the offsets.
-    linear: bool,
-}
-
 /// Where Gauss-Newton steps begin.
-struct Approach {
+struct Origin {
     start_v: Vec<f64>,
     kernels: Vec<Vec<f64>>,
     residual: Vec<f64>,
@@ -47,7 +32,7 @@ impl Engine<'_> {
             return None;
         }
         let observed = self.observed;
-        self.start_by(model, |row| observed.kinds[row] == Kind::Exact)
+        self.start_by(model, |row| observed.is_exact(row))
     }
 
     /// Returns the same from the rows for which `counts` is true.
@@ -55,7 +40,7 @@ impl Engine<'_> {
         let residual = self.residual_from_rest(model);
         let kernels = self.initial_states(model).to_vec();
         let steps = if self.simulator.is_linear_in_start() { 1 } else { STEPS_FROM_REST };
-        let from = Approach { start_v: vec![0.0; kernels.len()], kernels, residual, steps, renewed_from: 1 };
+        let from = Origin { start_v: vec![0.0; kernels.len()], kernels, residual, steps, renewed_from: 1 };
         self.approached_start(model, from, counts)
     }
 
@@ -65,8 +50,8 @@ impl Engine<'_> {
         let (start_v, kernels) = (known.start_v.clone(), known.kernels.clone());
         let residual = self.residual_from(model, &start_v);
         let observed = self.observed;
-        let from = Approach { start_v, kernels, residual, steps: STEPS_NEAR, renewed_from: 0 };
-        self.approached_start(model, from, |row| observed.kinds[row] == Kind::Exact)
+        let from = Origin { start_v, kernels, residual, steps: STEPS_NEAR, renewed_from: 0 };
+        self.approached_start(model, from, |row| observed.is_exact(row))
     }
 
     /// Returns reading minus prediction of each row, in V, with the most likely initial state; to first order around the one at a similar
@@ -74,15 +59,15 @@ impl Engine<'_> {
     pub(super) fn residual_near(&mut self, model: &Model, known: Option<&Start>) -> Vec<f64> {
         let Some(known) = known.filter(|known| !known.linear) else { return self.residual(model) };
         let mut residual = self.residual_from(model, &known.start_v);
-        let exact = |row: usize| self.observed.kinds[row] == Kind::Exact;
+        let exact = |row: usize| self.observed.is_exact(row);
         initial_state::subtract_estimate(&mut residual, &known.kernels, self.data.full_scale_v, exact);
         self.budget.spend(work::INITIAL_STATE * (known.kernels.len() * residual.len()) as u64);
         residual
     }
 
     /// Takes Gauss-Newton steps as long as they make the error in the rows for which `counts` is true smaller.
-    fn approached_start(&mut self, model: &Model, from: Approach, counts: impl Fn(usize) -> bool) -> Option<Start> {
-        let Approach { mut start_v, mut kernels, mut residual, steps, renewed_from } = from;
+    fn approached_start(&mut self, model: &Model, from: Origin, counts: impl Fn(usize) -> bool) -> Option<Start> {
+        let Origin { mut start_v, mut kernels, mut residual, steps, renewed_from } = from;
         let reach_v = self.data.full_scale_v;
         let squares = |residual: &[f64]| -> f64 {
             residual.iter().enumerate().filter(|(row, _)| counts(*row)).map(|(_, left)| left * left).sum()

@@ -89,14 +89,17 @@ fn without_stopped(records: &[Record]) -> (Cow<'_, [Record]>, Vec<AtBound>) {
     for (index, record) in records.iter().enumerate() {
         let readings: Vec<f64> = record.rows.iter().filter_map(|row| row.measured).collect();
         let bounds = Bounds::of_file(&readings);
+        if bounds == Bounds::default() {
+            continue;
+        }
         let mut without = record.clone();
         for row in &mut without.rows {
             row.measured = row.measured.filter(|reading| !bounds.stopped(*reading));
         }
-        let limits = bounds.upper.into_iter().chain(bounds.lower);
-        if limits.clone().next().is_none() || check(&without).is_err() {
+        if check(&without).is_err() {
             continue;
         }
+        let limits = bounds.upper.into_iter().chain(bounds.lower);
         kept.to_mut()[index] = without;
         stopped.extend(limits.map(|limit| AtBound {
             record: record.name.clone(),

@@ -119,6 +119,20 @@ impl Estimate {
     }
 }
 
+/// The estimate at a model, of a single record.
+pub(crate) struct Start {
+    /// Offset of each kernel's state, in V.
+    pub(crate) start_v: Vec<f64>,
+    /// How it follows a change of the residual.
+    pub(crate) estimate: Estimate,
+    /// Change of the prediction at each row for each state that is 1 V higher.
+    pub(crate) kernels: Vec<Vec<f64>>,
+    /// Reading minus prediction from there, in V.
+    pub(crate) residual: Vec<f64>,
+    /// True if the prediction is linear in the offsets.
+    pub(crate) linear: bool,
+}
+
 /// Subtracts the response to the most likely initial state from a residual, estimated from the rows for which `counts`
 /// is true, with a prior of standard deviation `reach_v`, in V. Returns its [cost], in nats.
 pub(crate) fn subtract_estimate(

@@ -74,7 +74,7 @@ impl Observed {
         let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, sign, weights: None };
         // Rounding makes the scale constant.
         if observed.step_beyond(COARSE.get()).is_none() {
-            observed.weights = heteroscedasticity::weights(data, |row| observed.kinds[row] == Kind::Exact);
+            observed.weights = heteroscedasticity::weights(data, |row| observed.is_exact(row));
         }
         observed
     }
@@ -150,6 +150,11 @@ impl Observed {
             return Cow::Borrowed(values);
         }
         values.iter().zip(&self.kinds).filter(|(_, kind)| **kind == Kind::Exact).map(|(value, _)| *value).collect()
+    }
+
+    /// Returns true if the reading of a row is the true value with noise.
+    pub fn is_exact(&self, row: usize) -> bool {
+        self.kinds[row] == Kind::Exact
     }
 
     /// Returns true if no reading stopped at a bound.
