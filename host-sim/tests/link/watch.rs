@@ -291,10 +291,10 @@ fn signals_disarm_and_restore_the_terminal() {
     }
 }
 
-/// Not a test: what the next one runs in a terminal.
-#[test]
-#[ignore = "runs in a terminal of the test below"]
-fn panics_on_a_full_screen() {
+/// Set where [`a_panic_restores_the_terminal_before_it_prints`] runs itself in a terminal.
+const PANICS: &str = "VSJ_TEST_PANICS_ON_A_FULL_SCREEN";
+
+fn panic_on_a_full_screen() {
     let _screen = host_sim::watch::terminal::FullScreen::enter().unwrap();
     std::thread::spawn(|| panic!("for a test")).join().unwrap_err();
     panic!("for a test");
@@ -302,8 +302,12 @@ fn panics_on_a_full_screen() {
 
 #[test]
 fn a_panic_restores_the_terminal_before_it_prints() {
+    if std::env::var_os(PANICS).is_some() {
+        panic_on_a_full_screen();
+    }
     let mut command = CommandBuilder::new(std::env::current_exe().unwrap());
-    command.args(["--ignored", "--exact", "watch::panics_on_a_full_screen", "--nocapture"]);
+    command.args(["--exact", "watch::a_panic_restores_the_terminal_before_it_prints", "--nocapture"]);
+    command.env(PANICS, "1");
     let mut terminal = Terminal::start(command);
     assert_ne!(terminal.end(), 0);
     terminal.assert_restored();
