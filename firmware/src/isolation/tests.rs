@@ -28,8 +28,6 @@ pub(crate) struct Rig {
     pub(crate) terms: Terms,
     /// Gain of the spring, as a ratio to that of the model.
     pub(crate) gain: f64,
-    /// The sensor repeats its last reading.
-    pub(crate) stuck: bool,
     slow_v: f64,
     measured: Option<Volts>,
     random: u32,
@@ -42,7 +40,7 @@ impl Rig {
         let mut isolation = Box::new(Isolation::NEW);
         isolation.start(&terms);
         let control = Control::new(&settings.control, &settings.supervision, None).unwrap();
-        Self { control, isolation, terms, gain: 1.0, stuck: false, slow_v: 0.0, measured: None, random: 1 }
+        Self { control, isolation, terms, gain: 1.0, slow_v: 0.0, measured: None, random: 1 }
     }
 
     /// One tick with a command and a target, in V.
@@ -59,9 +57,7 @@ impl Rig {
         self.slow_v = applied_v + (self.slow_v - applied_v) * (-1e-3 / time_constant_s).exp();
         self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let noise_v = f64::from(self.random) / 2f64.powi(32) * 0.6 - 0.3;
-        if !self.stuck {
-            self.measured = Some(Volts::new(stiffness_v + noise_v).unwrap());
-        }
+        self.measured = Some(Volts::new(stiffness_v + noise_v).unwrap());
         (tick, news)
     }
 

@@ -22,7 +22,7 @@ pub(super) struct Reports {
     number: u32,
     /// Tick in which the round began.
     round_at: u64,
-    // Arrays of each part of a report: an array of reports would take half as much RAM again.
+    // An array of each part of a report: one of reports would have three bytes of padding in each.
     ticks: [u64; FAULTS],
     numbers: [u32; FAULTS],
     mismatches: [Mismatch; FAULTS],
