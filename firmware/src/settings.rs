@@ -107,6 +107,20 @@ mod tests {
         assert_eq!(with_sensor(SETTINGS), Settings { feedback: SENSOR, ..SETTINGS });
     }
 
+    #[test]
+    #[cfg(feature = "fast")]
+    fn the_fast_image_differs_from_the_paper_by_its_controller_alone() {
+        let compensation = Compensation::TimeOptimal(Approach::DEAD_BEAT);
+        assert_eq!(fast(KILOVOLT), Settings { compensation, ..paper(KILOVOLT) });
+    }
+
+    #[test]
+    #[cfg(feature = "robust")]
+    fn the_robust_image_differs_from_the_paper_by_its_controller_alone() {
+        let compensation = Compensation::Robust(Margin::TYPICAL);
+        assert_eq!(robust(KILOVOLT), Settings { compensation, ..paper(KILOVOLT) });
+    }
+
     /// An image with others would start nothing.
     #[test]
     fn the_settings_that_are_built_in_can_run_at_the_rate_that_is_built_in() {

@@ -143,17 +143,22 @@ fn read(payload: &[u8], built_in: &device::Settings) -> Result<device::Settings,
     let wire = WireSettings::read(payload);
     let Some(wire) = &wire else { return Err(Reason::Damaged) };
     let settings = wire.over(built_in).map_err(Reason::NotBuiltIn)?;
-    if !cfg!(feature = "isolation") && !settings.trip_on_cause.is_empty() {
-        return Err(Reason::NotBuiltIn(Field::named("trip_on_cause")));
-    }
-    if !cfg!(feature = "adaptation") && settings.adaptation.is_some() {
-        return Err(Reason::NotBuiltIn(Field::named("adaptation.enabled")));
+    if let Some(field) = not_built_in(&settings, cfg!(feature = "isolation"), cfg!(feature = "adaptation")) {
+        return Err(Reason::NotBuiltIn(Field::named(field)));
     }
     settings.check().map_err(|error| Reason::of_settings(&error))?;
     if cfg!(feature = "adaptation") {
         settings.check_adaptation().map_err(|error| Reason::of_settings(&error))?;
     }
     Ok(settings)
+}
+
+/// Returns the first setting that asks for a part that the image does not have, if any does.
+fn not_built_in(settings: &device::Settings, isolation: bool, adaptation: bool) -> Option<&'static str> {
+    if !isolation && !settings.trip_on_cause.is_empty() {
+        return Some("trip_on_cause");
+    }
+    (!adaptation && settings.adaptation.is_some()).then_some("adaptation.enabled")
 }
 
 #[inline(never)]
@@ -181,8 +186,9 @@ mod tests {
     use crate::store::{Memory, Page, Side, WORD};
     use link::wire_model::FORMAT;
     use link::{Controller, Field, frame, wire_settings};
-    use model::adaptation;
+    use model::isolation::Causes;
     use model::supervisor::{Faults, State};
+    use model::{adaptation, isolation};
     use std::vec::Vec;
 
     const PAPER: Loaded = Loaded::fixed(built_in(SETTINGS));
@@ -394,17 +400,18 @@ mod tests {
                 assert!(matches!(wide, Err(Reason::BadSettings { field: found, .. }) if found == field));
             }
         }
-        // Also without a sensor, which an image with neither of them refuses.
-        if !cfg!(feature = "isolation") {
-            let trip = WireSettings { trip_on_cause: 0x8000, ..built_in_settings() };
-            assert_eq!(check(trip), contains(false, "trip_on_cause"));
-        }
-        if !cfg!(feature = "adaptation") {
-            let adapts =
-                WireSettings { adaptation: Some(adaptation::Settings::TYPICAL.values()), ..built_in_settings() };
-            assert_eq!(check(adapts), contains(false, "adaptation.enabled"));
-        }
         assert_eq!(check(WireSettings { controller: Controller::None, ..built_in_settings() }), Ok(()));
+    }
+
+    #[test]
+    fn an_image_without_isolation_and_adaptation_runs_neither() {
+        let plain = device::Settings { adaptation: None, ..BUILT_IN };
+        let trip = device::Settings { trip_on_cause: Causes::NONE.with(isolation::Cause::GainError), ..plain };
+        let adapts = device::Settings { adaptation: Some(adaptation::Settings::TYPICAL), ..plain };
+        assert_eq!(not_built_in(&plain, false, false), None);
+        assert_eq!([not_built_in(&trip, false, true), not_built_in(&trip, true, false)], [Some("trip_on_cause"), None]);
+        let refused = [not_built_in(&adapts, true, false), not_built_in(&adapts, false, true)];
+        assert_eq!(refused, [Some("adaptation.enabled"), None]);
     }
 
     #[test]

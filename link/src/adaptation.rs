@@ -99,5 +99,13 @@ mod tests {
         let new = AdaptationReport::new(Phase::Trial, &Parameters::STORED, &Settings::TYPICAL, Plant::PAPER);
         assert_eq!((new.phase(), new.why_off()), (Some(Phase::Trial), None));
         assert_eq!((new.ratios, new.bounds, new.stored[0]), ([1.0; 3], [0.25, 0.25, 0.15], 5.5));
+        let off = AdaptationReport::off(Off::ExtendedSpring, 7);
+        assert_eq!((off.tick, off.phase(), off.why_off()), (7, None, Some(Off::ExtendedSpring)));
+    }
+
+    #[test]
+    fn a_request_to_read_switches_nothing() {
+        let requests = [Adaptation::Read, Adaptation::Off, Adaptation::On];
+        assert_eq!(requests.map(Adaptation::switch), [None, Some(false), Some(true)]);
     }
 }

@@ -146,12 +146,19 @@ mod tests {
     proptest! {
         #[test]
         fn a_row_keeps_its_values(
-            code: u16, limits in 0..16u8, state in 0..4u32, measured: bool, missed: u8, stiffness: i32,
+            code: u16, limits in 0..16u8, state in 0..4usize, measured: bool, missed: u8, stiffness: i32,
         ) {
-            let state = Row::unpack([state << 20, 0]).state;
+            let state = [State::Disarmed, State::Armed, State::Ramping, State::Faulted][state];
             let row = Row { code, limits, state, measured, missed, stiffness: WireVolts(stiffness) };
             prop_assert_eq!(Row::unpack(row.pack()), row);
         }
+    }
+
+    #[test]
+    fn a_row_has_the_layout_that_the_module_shows() {
+        let state = State::Ramping;
+        let row = Row { code: 0x1234, limits: 5, state, measured: true, missed: 0xab, stiffness: WireVolts(-2) };
+        assert_eq!(row.pack(), [0xab65_1234, 0xffff_fffe]);
     }
 
     #[test]

@@ -120,8 +120,10 @@ mod tests {
         let names = ["not-built-in", "no-sensor", "extended-spring", "out-of-range", "settings"];
         assert_eq!([1, 2, 3, 4, 5].map(why), names.map(Some));
         assert_eq!(why(6), None);
-        assert_eq!(IsolationReport::off(Off::NoSensor, 7, Causes::NONE).verdict(), None);
         let trips = Causes::NONE.with(Cause::GainError).with(Cause::StuckSensor);
+        let off = IsolationReport::off(Off::NoSensor, 7, trips);
+        assert_eq!((off.tick, off.verdict(), off.why_off()), (7, None, Some(Off::NoSensor)));
+        assert!(off.trips().eq([Cause::GainError, Cause::StuckSensor]));
         let report = IsolationReport::new(Verdict::Named(Cause::Delay), None, 7, 5, trips);
         assert_eq!((report.verdict(), report.why_off()), (Some(Verdict::Named(Cause::Delay)), None));
         assert!(report.trips().eq([Cause::GainError, Cause::StuckSensor]));

@@ -255,6 +255,14 @@ mod tests {
     }
 
     #[test]
+    fn settings_without_a_sensor_replace_those_of_an_image_with_one() {
+        let mut with_sensor = BUILT_IN;
+        with_sensor.control.feedback = Some(Feedback::TYPICAL);
+        let without = WireSettings { sensor: None, ..WireSettings::new(&with_sensor) };
+        assert_eq!(without.over(&with_sensor).map(|settings| settings.control.feedback), Ok(None));
+    }
+
+    #[test]
     fn bytes_that_are_not_one_set_of_settings_are_rejected() {
         let payload = longest().payload().unwrap();
         for end in 0..payload.len() {

@@ -90,7 +90,7 @@ impl Reports {
 
 /// Returns the place of a fault's report.
 fn place(fault: supervisor::Fault) -> usize {
-    usize::from(fault.code() - 1) % FAULTS
+    usize::from(fault.code()) % FAULTS
 }
 
 #[cfg(test)]
