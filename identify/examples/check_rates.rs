@@ -62,7 +62,7 @@ fn finds(entry: &Entry, departure: Departure, seed: usize) -> bool {
     let (mut data, base) = (Data::new(&record, Input::Hold), Base::paper());
     let spring = match departure {
         Departure::Of("in_step") => effect("time-constant", 11f64.ln()),
-        Departure::Of("free_run") => effect("time-constant", 8f64.ln()),
+        Departure::Of("free_run" | "repetition") => effect("time-constant", 8f64.ln()),
         Departure::Of("residual_regression") => effect("time-constant", 6f64.ln()),
         _ => Model::default(),
     };

@@ -81,7 +81,7 @@ fn predictable(engine: &Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
 }
 
 /// Errors of constant scale, in V; readings beyond a bound and far-off ones count as 0.
-fn regular_errors(engine: &Engine, fit: &Fit) -> Vec<f64> {
+pub(super) fn regular_errors(engine: &Engine, fit: &Fit) -> Vec<f64> {
     let errors = engine.observed.errors(&fit.residual);
     let mut even = fit.noise.weighted(&errors).into_owned();
     if fit.noise.outliers.is_some() {
@@ -144,51 +144,19 @@ fn predicted(columns: &[&Column], target: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::index_of;
-    use crate::effects::model::{Block, Model};
-    use crate::fit::simulator::Simulator;
-    use crate::plant::base::Base;
-    use crate::record::data::Data;
-    use crate::record::input::Input;
-    use crate::record::observed::Observed;
+    use crate::adequacy::fixture::on_spring;
+    use crate::stats::coloured::{autoregressive, one_over_f};
     use crate::stats::scale::normals;
-    use simulation::record::{Record, Row};
 
     const ROWS: usize = 2400;
 
     /// Tests the paper's spring on a record of one with the time constant `tau_s`, in s, under 60 levels of 4 s each.
     fn tested(tau_s: f64, noise: &[f64]) -> (Fit, Option<UnmodelledDynamics>) {
         let volts = |row: usize| 100.0 * (row / 40 * 7 % 6) as f64;
-        let row = |row: usize| Row { line: row, time_s: 0.1 * row as f64, voltage_v: volts(row), measured: Some(0.0) };
-        let mut data = Data::new(&Record { name: String::new(), rows: (0..ROWS).map(row).collect() }, Input::Hold);
-        let base = Base::paper();
-        let time_constant = Block { effect: index_of("time-constant").unwrap(), form: 0 };
-        let mut readings = Vec::new();
-        Simulator::new(&data, &base).run(&Model::default().with(time_constant, vec![tau_s.ln()]), &mut readings);
-        data.reading = readings.iter().zip(noise).map(|(reading, noise)| reading + noise).collect();
-        let observed = Observed::new(&data);
-        let mut engine = Engine::new(&data, &observed, &base);
-        let fit = engine.evaluate(Model::default());
-        let found = predictable(&engine, &fit);
-        (fit, found)
-    }
-
-    /// A first-order autoregression of unit variance.
-    fn autoregressive(noise: &[f64], coefficient: f64) -> Vec<f64> {
-        let mut last = 0.0;
-        let follow = |noise: &f64| {
-            last = coefficient * last + (1.0 - coefficient * coefficient).sqrt() * noise;
-            last
-        };
-        noise.iter().map(follow).collect()
-    }
-
-    /// Means of noise that keep all of its power in slow changes: an equal sum of autoregressions an octave apart, as 1/f noise.
-    fn one_over_f(noise: &[f64]) -> Vec<f64> {
-        let octaves: Vec<Vec<f64>> = (0..8)
-            .map(|octave| autoregressive(&noise[octave * ROWS..][..ROWS], (-(0.5f64.powi(octave as i32))).exp()))
-            .collect();
-        (0..ROWS).map(|row| octaves.iter().map(|octave| octave[row]).sum::<f64>() / 8f64.sqrt()).collect()
+        on_spring(tau_s, volts, noise, |engine, fit| {
+            let found = predictable(engine, &fit);
+            (fit, found)
+        })
     }
 
     /// The free run has 2.4 times the error of the noise; the autoregression takes nearly all of the excess.
@@ -207,7 +175,7 @@ mod tests {
         let noise = normals(160 * ROWS);
         for record in 0..16 {
             let noise = &noise[10 * record * ROWS..];
-            for noise in [noise[..ROWS].to_vec(), autoregressive(&noise[..ROWS], 0.9), one_over_f(noise)] {
+            for noise in [noise[..ROWS].to_vec(), autoregressive(&noise[..ROWS], 0.9), one_over_f(noise, ROWS)] {
                 assert_eq!(tested(5.5, &noise).1, None, "{record}");
             }
         }

@@ -17,11 +17,14 @@ mod absorbed_by_noise;
 mod check;
 mod comparison;
 mod excitation;
+#[cfg(test)]
+mod fixture;
 mod free_run;
 mod gain_and_time_constant;
 mod in_step;
 mod localisation;
 mod no_response;
+mod repetition;
 mod residual_regression;
 mod spikes;
 mod standstill;
@@ -70,7 +73,7 @@ pub struct Entry {
 /// noise of 1 V, half of it independent and half autoregressive; `cargo run -p identify --example check_rates` prints the counts.
 /// The design rates are smaller: `in_step`, `spikes` and `residual_regression` are significant by chance in one of ten thousand
 /// records.
-pub static CHECKS: [Entry; 8] = [
+pub static CHECKS: [Entry; 9] = [
     Entry {
         check: &excitation::Excitation,
         when: When::BeforeSearch,
@@ -123,6 +126,14 @@ pub static CHECKS: [Entry; 8] = [
         check: &free_run::FreeRun,
         when: When::ForReport,
         looks_for: "a free-running error that earlier voltages predict",
+        false_alarm_rate: 0.015,
+        departure: "a time constant of 8 s instead of 5.5 s",
+        power: 0.98,
+    },
+    Entry {
+        check: &repetition::Repetition,
+        when: When::ForReport,
+        looks_for: "errors that repeat with the period of the voltage",
         false_alarm_rate: 0.015,
         departure: "a time constant of 8 s instead of 5.5 s",
         power: 0.98,

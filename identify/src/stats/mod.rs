@@ -7,6 +7,8 @@
 //! - [`thresholds`]: the number that each decision of the diagnosis is compared with.
 //! - *Periodogram*: the squared magnitude of the discrete Fourier transform.
 
+#[cfg(test)]
+pub(crate) mod coloured;
 pub mod median;
 pub mod periodogram;
 pub mod scale;

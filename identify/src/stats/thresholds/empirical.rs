@@ -164,6 +164,8 @@ thresholds! {
     COLOUR_OF_WHITE = 4.0, "standard errors";
     /// If earlier voltages predict more of an error that is not white, it is not noise: of 1/f noise they predict up to 0.2.
     SHARE_OF_COLOURED_NOISE = 0.35, "of the error's mean square", set by "cargo campaign nulls";
+    /// A voltage that changes less from one period to the next is periodic.
+    REPEATED_VOLTAGE = 0.01, "of its variance";
     /// Fewest rows in each of the eight parts whose means are compared with the error's scale.
     ROWS_PER_SWING = 10.0, "rows";
     /// An error with more of its mean square in the parts' means is not stationary noise.
