@@ -34,6 +34,8 @@ const MOST_REJECTED: usize = 6;
 pub struct Poles {
     /// The factors of the denominator.
     pub sections: Vec<Section>,
+    /// Places of the sections that do not respond to the voltage, but only decay from their state at the first reading.
+    pub undriven: Vec<usize>,
     /// Delay of the voltage, in the unit of time of the series.
     pub delay: f64,
 }
@@ -91,6 +93,11 @@ impl Poles {
     pub fn order(&self) -> usize {
         self.sections.iter().map(|section| section.order()).sum()
     }
+
+    /// The sections that respond to the voltage, with their places.
+    pub fn driven(&self) -> impl Iterator<Item = (usize, Section)> {
+        self.sections.iter().copied().enumerate().filter(|(place, _)| !self.undriven.contains(place))
+    }
 }
 
 impl Fit {
@@ -109,14 +116,20 @@ impl Fit {
         self.instantaneous() + self.numerators().map(|(_, numerator)| numerator[0]).sum::<f64>()
     }
 
-    /// Each section with the coefficients of its `w` and `v`; that of `v` is 0 in a lag.
+    /// Each section that responds to the voltage with the coefficients of its `w` and `v`; that of `v` is 0 in a lag.
     pub fn numerators(&self) -> impl Iterator<Item = (Section, [f64; 2])> {
-        let mut rest = &self.shared()[1..];
-        self.poles.sections.iter().map(move |&section| {
+        self.driven(&self.shared()[1..]).map(|(section, own)| (section, [own[0], own.get(1).copied().unwrap_or(0.0)]))
+    }
+
+    /// The sections that respond to the voltage with those of `coefficients` that belong to each.
+    fn driven<'f>(&'f self, coefficients: &'f [f64]) -> impl Iterator<Item = (Section, &'f [f64])> {
+        let mut rest = coefficients;
+        let with_own = self.poles.sections.iter().enumerate().map(move |(index, &section)| {
             let (own, others) = rest.split_at(section.order());
             rest = others;
-            (section, [own[0], own.get(1).copied().unwrap_or(0.0)])
-        })
+            (index, section, own)
+        });
+        with_own.filter(|(index, ..)| !self.poles.undriven.contains(index)).map(|(_, section, own)| (section, own))
     }
 
     /// All parameters in the order of the basis: those of each record, then instantaneous part and numerators, then, of a linearised
@@ -175,13 +188,7 @@ impl Fit {
 
     /// Deviation of the model's first reading of a record from the reading that the first voltage would settle at.
     pub fn start(&self, record: usize) -> f64 {
-        let mut rest = &self.own(record)[1..];
-        let mut sum = 0.0;
-        for section in &self.poles.sections {
-            sum += rest[0];
-            rest = &rest[section.order()..];
-        }
-        sum
+        self.driven(&self.own(record)[1..]).map(|(_, own)| own[0]).sum()
     }
 
     /// Zero of a record relative to the mean of its readings, and the coefficients of its free responses.
@@ -192,9 +199,16 @@ impl Fit {
 }
 
 impl Problem {
-    /// Zero of a record: the reading at rest without a voltage.
+    /// Zero of a record: the reading at rest without a voltage, where something else drifts the one at the first reading.
     pub fn zero(&self, fit: &Fit, record: usize) -> f64 {
-        self.means[record] + fit.own(record)[0]
+        let own = fit.own(record);
+        let undriven = |place: &usize| match fit.poles.sections[*place] {
+            Section::First { .. } => {
+                own[1 + fit.poles.sections[..*place].iter().map(|before| before.order()).sum::<usize>()]
+            }
+            Section::Second { .. } => 0.0,
+        };
+        self.means[record] + own[0] + fit.poles.undriven.iter().map(undriven).sum::<f64>()
     }
 
     /// The records of one spring.
@@ -284,15 +298,14 @@ impl Problem {
 
     /// The parameters of a model that lie on a bound of the search, each in a few words.
     pub fn on_bounds(&self, poles: &Poles) -> Vec<&'static str> {
-        let Bounds { tau, frequency, decay, delay, .. } = self.bounds;
-        let at = |value: f64, bound: f64| (value / bound - 1.0).abs() < 1e-6;
+        let Bounds { tau, frequency, delay, .. } = self.bounds;
         let mut found = Vec::new();
-        for section in &poles.sections {
-            match *section {
+        for (_, section) in poles.driven() {
+            match section {
                 Section::First { tau: of } if at(of, tau.0) => found.push("the shortest time constant"),
                 Section::First { tau: of } if at(of, tau.1) => found.push("the longest time constant"),
                 Section::Second { frequency: of, .. } if at(of, frequency.1) => found.push("the highest frequency"),
-                Section::Second { damping, frequency } if damping < 1.0 && at(damping * frequency * decay, 1.0) => {
+                Section::Second { .. } if self.never_decays(section) => {
                     found.push("the longest decay of an oscillation");
                 }
                 Section::Second { damping, frequency } if at(2.0 * damping / frequency, tau.1) => {
@@ -305,6 +318,12 @@ impl Problem {
             found.push("the longest delay");
         }
         found
+    }
+
+    /// True of an oscillation that decays as slowly as the bounds allow.
+    pub fn never_decays(&self, section: Section) -> bool {
+        matches!(section, Section::Second { damping, frequency }
+            if damping < 1.0 && at(damping * frequency * self.bounds.decay, 1.0))
     }
 
     /// First row of each record among the rows of all.
@@ -379,6 +398,22 @@ impl Problem {
     }
 
     fn fitted(&self, paths: &[Path], responses: &[Vec<Response>], poles: Poles) -> Fit {
+        let basis = self.basis(paths, responses, &poles);
+        let mut residual = self.weighted(self.readings.clone());
+        let coordinates = basis.project(&mut residual);
+        let coefficients = basis.solve(&coordinates);
+        let cost = dot(&residual.values, &residual.values);
+        Fit {
+            poles,
+            residual: residual.values,
+            cost: if cost.is_finite() { cost } else { f64::INFINITY },
+            coefficients,
+            basis,
+        }
+    }
+
+    /// The columns of the linear coefficients; those of an undriven section's response to the voltage are empty.
+    fn basis(&self, paths: &[Path], responses: &[Vec<Response>], poles: &Poles) -> Orthonormal {
         let mut basis = Orthonormal::new();
         for (record, &first) in self.starts.iter().enumerate() {
             basis.add(self.weighted(Column { first, values: vec![1.0; paths[record].voltage.len()] }));
@@ -391,21 +426,16 @@ impl Problem {
         let all = |parts: Vec<&[f64]>| self.weighted(Column { first: 0, values: parts.concat() });
         basis.add(all(paths.iter().map(|path| path.voltage.as_slice()).collect()));
         for (index, section) in poles.sections.iter().enumerate() {
+            let driven = !poles.undriven.contains(&index);
             for part in 0..section.order() {
-                basis.add(all(responses.iter().map(|of| of[index].forced[part].as_slice()).collect()));
+                basis.add(if driven {
+                    all(responses.iter().map(|of| of[index].forced[part].as_slice()).collect())
+                } else {
+                    Column { first: 0, values: Vec::new() }
+                });
             }
         }
-        let mut residual = self.weighted(self.readings.clone());
-        let coordinates = basis.project(&mut residual);
-        let coefficients = basis.solve(&coordinates);
-        let cost = dot(&residual.values, &residual.values);
-        Fit {
-            poles,
-            residual: residual.values,
-            cost: if cost.is_finite() { cost } else { f64::INFINITY },
-            coefficients,
-            basis,
-        }
+        basis
     }
 
     /// Fits the linear coefficients and adds the derivatives by the searched parameters to the basis: the logarithms of each
@@ -532,12 +562,12 @@ impl Problem {
             }
         }
         let later = step.get(at).copied().unwrap_or(0.0).clamp(-LONGEST_DELAY_STEP, LONGEST_DELAY_STEP) * self.spacing;
-        self.within(Poles { sections, delay: poles.delay + later })
+        self.within(Poles { sections, delay: poles.delay + later, undriven: poles.undriven.clone() })
     }
 
     /// The section, moved into the bounds.
     pub(super) fn section_within(&self, section: Section) -> Section {
-        let poles = self.within(Poles { sections: vec![section], delay: 0.0 });
+        let poles = self.within(Poles { sections: vec![section], undriven: Vec::new(), delay: 0.0 });
         poles.sections[0]
     }
 
@@ -555,8 +585,14 @@ impl Problem {
             }
         };
         let late = if whole_rows { (poles.delay / self.spacing).round() * self.spacing } else { poles.delay };
-        Poles { sections: poles.sections.into_iter().map(inside).collect(), delay: late.clamp(delay.0, delay.1) }
+        let sections = poles.sections.into_iter().map(inside).collect();
+        Poles { sections, undriven: poles.undriven, delay: late.clamp(delay.0, delay.1) }
     }
+}
+
+/// True if a value lies on a bound.
+fn at(value: f64, bound: f64) -> bool {
+    (value / bound - 1.0).abs() < 1e-6
 }
 
 /// Subtracts `factor values` from each row.

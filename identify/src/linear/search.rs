@@ -125,7 +125,7 @@ fn costs(problem: &Problem, mut starts: Vec<Poles>) -> Vec<(f64, Poles)> {
 
 /// The starts of an order with their costs; `found` holds the best models of all lower orders.
 fn starts(problem: &Problem, order: usize, found: &[Vec<Poles>]) -> Vec<(f64, Poles)> {
-    let none = |delay| Poles { sections: Vec::new(), delay };
+    let none = |delay| Poles { sections: Vec::new(), undriven: Vec::new(), delay };
     let taus = geometric(0.5 * problem.spacing, problem.bounds.tau.1, TAU_RATIO).map(|tau| Section::First { tau });
     let lags: Vec<Section> = taus.collect();
     let mut starts = Vec::new();

@@ -8,6 +8,9 @@
 //! A factor of second order has two real poles for `z >= 1` and a complex pair below; its response is smooth across `z = 1`, where
 //! two separate lags would have the same response.
 
+/// Smallest ratio of two time constants that are separate lags: closer ones would have large weights of opposite sign.
+const DISTINCT: f64 = 1.25;
+
 /// A factor of the denominator with a static gain of 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Section {
@@ -62,6 +65,16 @@ impl Section {
                 Some(vec![slow, 1.0 / (frequency * frequency * slow)])
             }
             Self::Second { .. } => None,
+        }
+    }
+
+    /// The lags of a section with two distinct time constants, the slower one first, or the section itself.
+    pub fn apart(self) -> Vec<Self> {
+        match (self, self.time_constants().as_deref()) {
+            (Self::Second { .. }, Some(&[slow, fast])) if slow > DISTINCT * fast => {
+                vec![Self::First { tau: slow }, Self::First { tau: fast }]
+            }
+            _ => vec![self],
         }
     }
 

@@ -244,10 +244,10 @@ fn magnitude_of_a_linear_voltage_has_its_zeros() {
     let series = Series::new(&record, Input::Linear);
     assert!(series.has_both_signs());
     let problem = Problem::new(vec![series.rectified()]);
-    let fit = problem.fit(Poles { sections: Vec::new(), delay: 0.0 });
+    let fit = problem.fit(Poles { sections: Vec::new(), undriven: Vec::new(), delay: 0.0 });
     near(fit.gain(), 1.0, 1e-9);
     // From 4 V to -12 V, the magnitude is zero after a quarter of a row and 4 V after half a row.
-    let halves = Poles { sections: Vec::new(), delay: 0.5 };
+    let halves = Poles { sections: Vec::new(), undriven: Vec::new(), delay: 0.5 };
     let left = problem.residual(&Fit { poles: halves, ..fit });
     near(left[1], 12.0 - 4.0, 1e-9);
 }

@@ -7,9 +7,6 @@ use std::f64::consts::TAU;
 
 use crate::linear::{Fit, Problem, Section};
 
-/// Smallest ratio of two time constants that are separate lags: closer ones would have large weights of opposite sign.
-const DISTINCT: f64 = 1.25;
-
 /// The quantities of a model, in the units of the record; shares and weights are parts of the static gain.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Canonical {
@@ -33,8 +30,8 @@ impl Canonical {
         for (section, [w, v]) in fit.numerators() {
             match section {
                 Section::First { tau } => lags.push((tau, w / gain)),
-                Section::Second { frequency, damping } => match section.time_constants().as_deref() {
-                    Some(&[slow, fast]) if slow > DISTINCT * fast => {
+                Section::Second { frequency, damping } => match section.apart()[..] {
+                    [Section::First { tau: slow }, Section::First { tau: fast }] => {
                         let weight = |tau: f64, other: f64| (w - v / (frequency * tau)) * tau / (tau - other) / gain;
                         lags.extend([(slow, weight(slow, fast)), (fast, weight(fast, slow))]);
                     }

@@ -62,6 +62,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     let Models { law, problem, fits, .. } = models;
     let Model { fit, held_out, last_part } = &fits[order];
     let rows = problem.rows();
+    let driven: usize = fit.poles.driven().map(|(_, section)| section.order()).sum();
     let spectrum = Spectrum::of(&fit.residual, problem.starts(), &directions(problem, fit));
     let canonical = Canonical::of(problem, fit);
     let mut deviations = deviations(problem, fit, &canonical, &spectrum).into_iter();
@@ -110,7 +111,8 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     let mut report = Report {
         schema: SCHEMA,
         rows,
-        order,
+        order: driven,
+        undriven_order: order - driven,
         nominal,
         oscillation,
         input_law: *law,

@@ -1,9 +1,11 @@
 //! The best linear model of each order, and which of them is the nominal one: the smallest that no larger one beats.
 
+use std::f64::consts::TAU;
+
 use simulation::record::Record;
 
 use crate::answer::LinearError;
-use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
+use crate::linear::{Fit, Poles, Problem, Section, Series, best_of_each_order, held_out_residual};
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::InputLaw;
 use crate::nominal::usable::check;
@@ -12,7 +14,8 @@ use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::segments::excess;
 use crate::stats::sums::dot;
-use crate::stats::thresholds::probability::{RIVAL_ODDS, Z_DOUBTFUL, Z_WORSE};
+use crate::stats::thresholds::empirical::FEWEST_PERIODS;
+use crate::stats::thresholds::probability::{RIVAL_ODDS, Z, Z_DOUBTFUL, Z_WORSE};
 
 /// A larger model is preferred if its held-out error is smaller by this part, ...
 pub(super) const WORTHWHILE: f64 = 0.005;
@@ -83,9 +86,12 @@ impl Models {
             let held_out = held_out_residual(&problem, &fit);
             Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
-        let fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
+        let mut fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
         let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
         let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
+        if let Some(fit) = without_undriven(&problem, &fits[chosen].fit) {
+            fits[chosen] = with_errors(fit);
+        }
         Self { law, problem, fits, chosen }
     }
 
@@ -152,13 +158,48 @@ fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
     {
         return true;
     }
-    let Spectrum { ar, innovations } = Spectrum::of(&large.held_out, problem.starts(), &[]);
-    let power = dot(&large.held_out, &large.held_out);
-    let rows = large.held_out.len() as f64;
-    let effective = power * (1.0 - ar.iter().sum::<f64>()).powi(2) / innovations;
     let price = if confirmed { PRICE_IF_CONFIRMED } else { PRICE_OF_POLE };
     let more = (large.fit.poles.order() - small.fit.poles.order()) as f64;
-    -effective.min(rows) * ratio.ln() > RIVAL_ODDS + price * more
+    -effective_rows(problem, &large.held_out) * ratio.ln() > RIVAL_ODDS + price * more
+}
+
+/// Number of independent errors with the same information on a mean.
+fn effective_rows(problem: &Problem, errors: &[f64]) -> f64 {
+    let Spectrum { ar, innovations } = Spectrum::of(errors, problem.starts(), &[]);
+    let effective = dot(errors, errors) * (1.0 - ar.iter().sum::<f64>()).powi(2) / innovations;
+    effective.min(errors.len() as f64)
+}
+
+/// A model in which what the voltage does not drive only decays from its state at the first reading: it is no part of the spring. A slow
+/// lag follows a drift, an oscillation a hum; one that lasts as long as the record would need no voltage either. `None` if the voltage
+/// drives all of it.
+fn without_undriven(problem: &Problem, fit: &Fit) -> Option<Fit> {
+    let effective =
+        if is_structured(problem, &fit.residual) { f64::INFINITY } else { effective_rows(problem, &fit.residual) };
+    let sections = fit.poles.sections.iter().flat_map(|section| section.apart()).collect();
+    let refined = |poles: Poles| problem.refined(poles, steps(problem), REFIT.1);
+    let poles = Poles { sections, ..fit.poles.clone() };
+    let is_hum = |section: Section| match section {
+        Section::Second { frequency, .. } => {
+            problem.never_decays(section) && frequency * problem.bounds.decay > TAU * FEWEST_PERIODS.get()
+        }
+        Section::First { .. } => false,
+    };
+    let lasting: Vec<usize> = poles.driven().filter(|(_, section)| is_hum(*section)).map(|(place, _)| place).collect();
+    let mut found = (!lasting.is_empty()).then(|| refined(Poles { undriven: lasting, ..poles.clone() }));
+    loop {
+        let (poles, cost) = found.as_ref().map_or((&poles, fit.cost), |found| (&found.poles, found.cost));
+        let without =
+            |place| Poles { undriven: poles.undriven.iter().copied().chain([place]).collect(), ..poles.clone() };
+        let costs = poles.driven().map(|(place, section)| (problem.fit(without(place)).cost, place, section));
+        let Some((_, place, section)) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) else { return found };
+        let less = refined(without(place));
+        let ratio = (cost / less.cost).sqrt();
+        if ratio < 1.0 - WORTHWHILE && -effective * ratio.ln() > 0.5 * Z * Z * section.order() as f64 {
+            return found;
+        }
+        found = Some(less);
+    }
 }
 
 /// Returns the best linear model of order 1 to 4 by its held-out error; `None` if there is none.

@@ -1,9 +1,11 @@
 //! What records cannot tell about a spring, in sentences.
 
+use std::f64::consts::TAU;
+
 use simulation::units::Units;
 
 use crate::dimension::significant;
-use crate::linear::{Fit, Problem};
+use crate::linear::{Fit, Problem, Section};
 use crate::nominal::models::STRUCTURED;
 use crate::nominal::report::{AtBound, FarReading, InputLaw, Report};
 
@@ -64,6 +66,18 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         } else {
             "The records show no static response: the interval of the gain contains 0.".into()
         });
+    }
+    let undriven = fit.poles.undriven.iter().map(|&place| match fit.poles.sections[place] {
+        Section::First { tau } => format!("a change over {} that fades", time(tau)),
+        Section::Second { frequency, .. } => format!("an oscillation of {} Hz", significant(frequency / TAU, 4)),
+    });
+    let undriven: Vec<String> = undriven.collect();
+    if !undriven.is_empty() {
+        remarks.push(format!(
+            "The readings show {}, which the voltage does not drive: a drift or a hum, which `vsj diagnose` names; the model of the \
+             spring is without it.",
+            undriven.join(" and ")
+        ));
     }
     for bound in problem.on_bounds(&fit.poles) {
         remarks

@@ -120,6 +120,8 @@ pub struct Report {
     pub rows: usize,
     /// Number of poles of the nominal model.
     pub order: usize,
+    /// Number of further poles that the readings show and the voltage does not drive: a drift or a hum, no part of the spring.
+    pub undriven_order: usize,
     /// The model.
     pub nominal: Nominal,
     /// Complex pairs of poles.

@@ -35,7 +35,7 @@ fn intervals_contain_the_truth_in_about_95_percent_of_the_records() {
     for phi in [0.0, 0.8] {
         let mut inside = [0; 4];
         let mut orders = [0; 5];
-        let seeds = 100;
+        let seeds = 200;
         for seed in 0..seeds {
             let report = found(&[record(400, 400 * seed + 1000, phi, 0.5)]).report;
             orders[report.order] += 1;
@@ -54,6 +54,30 @@ fn intervals_contain_the_truth_in_about_95_percent_of_the_records() {
         );
         assert!(orders[1] * 100 >= 80 * seeds, "{orders:?}");
     }
+}
+
+/// A drift would be a slow lag, and a hum an oscillation, that begin at the first reading.
+#[test]
+fn what_the_voltage_does_not_drive_is_no_part_of_the_spring() {
+    let plain = record(600, 3000, 0.0, 0.1);
+    let with = |more: &dyn Fn(f64) -> f64| {
+        let mut record = plain.clone();
+        record.rows.iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + more(row.time_s)));
+        found(&[record]).report
+    };
+    let drift = with(&|time_s| 0.05 * time_s);
+    let hum = with(&|time_s| 10.0 * (2.0 * time_s).sin());
+    for (report, least) in [(&drift, 1), (&hum, 2)] {
+        assert_eq!((report.order, report.oscillation.len()), (1, 0), "{report:?}");
+        assert!(report.undriven_order >= least, "{report:?}");
+        assert!(report.remarks.iter().any(|remark| remark.contains("does not drive")), "{:?}", report.remarks);
+        let Nominal { gain, zero, tau_s, .. } = &report.nominal;
+        assert!((gain.value / 0.5 - 1.0).abs() < 0.01 && (tau_s[0].tau.value / 4.0 - 1.0).abs() < 0.02, "{report:?}");
+        assert!((zero.low..=zero.high).contains(&3.0), "{zero:?}");
+    }
+    // That of the first reading.
+    assert!((drift.nominal.zero.value - 3.0).abs() < 0.2, "{:?}", drift.nominal.zero);
+    assert_eq!(with(&|_| 0.0).undriven_order, 0);
 }
 
 /// Fitted as they are, readings at a bound would lower the gain and add time constants.
