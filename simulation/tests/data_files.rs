@@ -325,9 +325,19 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
             "line 1: no column `stiffness`; expected a header with t, voltage_v, stiffness, or --time t --voltage u --reading y, found `t,u,y`",
         ),
         (
-            "time,u_V,x_mm\n31.01.2026 10:00,1,2\n".into(),
+            "time,u_V,x_mm\n01/31/2026 10:00,1,2\n".into(),
             &any,
-            "line 2, column time: `31.01.2026 10:00` is not a time stamp of ISO 8601; expected a number or one such as 2026",
+            "line 2, column time: `01/31/2026 10:00` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, 31",
+        ),
+        (
+            "time,u_V,x_mm\n10:00:00,1,2\n2026-01-31T10:00:01,1,2\n".into(),
+            &any,
+            "line 3, column time: `2026-01-31T10:00:01` is not a time of day, as in the first row; expected another such",
+        ),
+        (
+            "time,u_V,x_mm\n10:00:01,1,2\n10:00:00,1,2\n".into(),
+            &any,
+            "line 3, column time: 10:00:00 follows a later or equal time; expected increasing times",
         ),
         ("0,0,2\n1,2,3\n".into(), &any, "line 1: numbers instead of names; expected a header with time_s"),
         (
@@ -422,6 +432,13 @@ fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
     let from_first = vec!["r.csv: times are counted from the first row".to_owned()];
     let stamps = "Time;u_V;x_mm\n2026-01-31T23:59:59,5;0;1\n2026-02-01 00:00:01;0;1\n";
     assert_eq!(times(stamps), (vec![0.0, 1.5], "s".to_owned(), from_first.clone()));
+    let days_first = "Time;u_V;x_mm\n31.01.2026 23:59:59,5;0;1\n1.2.2026 00:00:01;0;1\n";
+    assert_eq!(times(days_first), (vec![0.0, 1.5], "s".to_owned(), from_first.clone()));
+    let over_two_midnights = "Time;u_V;x_mm\n23:59:59,5;0;1\n0:00:01;0;1\n11:00:00;0;1\n22:00:00;0;1\n9:00:00;0;1\n";
+    let expected = vec![0.0, 1.5, 39600.5, 79200.5, 118_800.5];
+    assert_eq!(times(over_two_midnights), (expected, "s".to_owned(), from_first.clone()));
+    let elapsed = "Time;u_V;x_mm\n0:00:00;0;1\n15:00:00;0;1\n31:00:00,25;0;1\n";
+    assert_eq!(times(elapsed), (vec![0.0, 54000.0, 111_600.25], "s".to_owned(), from_first.clone()));
     // The difference is a nanosecond; doubles of this size are 256 apart.
     let epoch = "t_ns,u_V,x_mm\n1767225600123456789,0,1\n1767225600123456790,0,1\n";
     assert_eq!(times(epoch), (vec![0.0, 1e-9], "ns".to_owned(), from_first));

@@ -20,7 +20,7 @@ pub(crate) struct RecordArguments {
     /// most 1 000 000 rows and 512 MiB
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
-    /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of ISO 8601 time stamps; default: time_s
+    /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of time stamps or times of day; default: time_s
     #[arg(long, value_name = "NAME[:UNIT]")]
     time: Option<String>,
     /// Column of the commanded voltage and its unit: nV to MV, or any other unit of a command; default: voltage_v, else

@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::columns;
 use super::gaps::{median_interval, missed_turns};
 use super::names::{Column, ColumnNames, Columns, usual};
-use super::times::{Clock, Time, is_dated};
+use super::times::{Clock, Time, is_stamp};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
@@ -242,14 +242,14 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
     let unit_of_time = units[0].as_deref().map(Unit::of_time).transpose();
     let is_of_units = (units[1..].iter().any(Option::is_some) || matches!(unit_of_time, Ok(Some(_))))
         && !in_order.iter().any(|column| row.is_number(*column))
-        && !is_dated(row.text(time));
+        && !is_stamp(row.text(time));
     if !is_of_units {
         table.return_row();
         return Ok([None, None, None]);
     }
     let place = row.place(time);
     if let Some(first) = table.next_row()? {
-        let has_stamps = is_dated(first.text(time));
+        let has_stamps = is_stamp(first.text(time));
         table.return_row();
         match unit_of_time {
             _ if has_stamps => units[0] = None,

@@ -1,12 +1,15 @@
-//! Times of a record: numbers in a unit, or time stamps of ISO 8601.
+//! Times of a record: numbers in a unit, time stamps, or times of day.
 
-use chrono::{DateTime, NaiveDateTime};
+use chrono::{DateTime, NaiveDateTime, NaiveTime, Timelike};
 
 use anyhow::Result;
 
 use crate::bad_input;
 use crate::bad_input::excerpt;
 use crate::csv_table::Row;
+
+/// Nanoseconds in a day.
+const DAY_NS: i128 = 86_400_000_000_000;
 
 /// A time as read from a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +32,8 @@ impl Time {
 #[derive(Debug, Default)]
 pub(super) struct Clock {
     first: Option<First>,
+    /// The last time of day, in ns since the first midnight.
+    last: i128,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -56,23 +61,26 @@ impl Clock {
                 "{}: `{text}` is a date without time; expected a number or a time stamp such as 2026-01-31T23:59:58.5",
                 row.place(column)
             ),
-            // A clock's time or a date of another form.
+            // `31/01/2026` or `01/31/2026`, `59:58.5`: which number is the day, the hour?
             None if text.contains([':', '/']) => bad_input!(
-                "{}: `{}` is not a time stamp of ISO 8601; expected a number or one such as 2026-01-31T23:59:58.5",
+                "{}: `{}` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, 31.01.2026 23:59:58.5, 23:59:58.5",
                 row.place(column),
                 excerpt(text)
             ),
             None => First::Number(row.number(column)?, Exact::parse(text)),
         });
         match (first, stamp) {
-            (First::Stamp(first), Some(stamp)) if first.has_zone == stamp.has_zone => {
+            (First::Stamp(first), Some(mut stamp)) if first.form == stamp.form => {
+                if stamp.form == Form::TimeOfDay {
+                    // After midnight a clock begins again.
+                    stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
+                    self.last = stamp.nanoseconds;
+                }
                 let since_first = (stamp.nanoseconds - first.nanoseconds) as f64 * 1e-9;
                 Ok(Time { value: since_first, since_first })
             }
-            (First::Stamp(Stamp { has_zone, .. }), _) => {
-                let zone = if has_zone { "with" } else { "without" };
-                Err(row
-                    .is_not(column, &format!("a time stamp {zone} a zone, as in the first row; expected another such")))
+            (First::Stamp(Stamp { form, .. }), _) => {
+                Err(row.is_not(column, &format!("{}, as in the first row; expected another such", form.name())))
             }
             (First::Number(..), Some(_)) => {
                 Err(row.is_not(column, "a finite number, as in the first row; expected another"))
@@ -110,43 +118,74 @@ impl Exact {
     }
 }
 
+/// What a time stamp counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// Midnight, or the start of a measurement: `23:59:58.5`, hours may exceed a day.
+    TimeOfDay,
+    WithoutZone,
+    WithZone,
+}
+
+impl Form {
+    fn name(self) -> &'static str {
+        ["a time of day", "a time stamp without a zone", "a time stamp with a zone"][self as usize]
+    }
+}
+
 /// A point in time, UTC unless it has no zone.
 #[derive(Clone, Copy, Debug)]
 struct Stamp {
     nanoseconds: i128,
-    has_zone: bool,
+    form: Form,
 }
 
 impl Stamp {
     fn parse(text: &str) -> Option<Self> {
-        if !is_dated(text) {
+        let text = text.replacen(',', ".", 1);
+        let stamp = |seconds: i64, below: u32, form: Form| Self {
+            nanoseconds: i128::from(seconds) * 1_000_000_000 + i128::from(below),
+            form,
+        };
+        if let Some((hours, rest)) = text.split_once(':').filter(|(hours, _)| is_digits(hours, 1, 4)) {
+            let time = NaiveTime::parse_from_str(&format!("0:{rest}"), "%H:%M:%S%.f").ok()?;
+            let seconds = 3600 * hours.parse::<i64>().ok()? + i64::from(time.num_seconds_from_midnight());
+            return Some(stamp(seconds, time.nanosecond(), Form::TimeOfDay));
+        }
+        if !is_dated(&text) {
             return None;
         }
-        let text = text.replacen(',', ".", 1);
-        let nanoseconds = |seconds: i64, below: u32| i128::from(seconds) * 1_000_000_000 + i128::from(below);
-        ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%d %H:%M"].iter().find_map(|form| {
-            if let Ok(time) = NaiveDateTime::parse_from_str(&text, form).map(|time| time.and_utc()) {
-                return Some(Self {
-                    nanoseconds: nanoseconds(time.timestamp(), time.timestamp_subsec_nanos()),
-                    has_zone: false,
-                });
+        let dates = ["%Y-%m-%dT", "%Y-%m-%d ", "%d.%m.%Y "];
+        dates.iter().flat_map(|date| ["%H:%M:%S%.f", "%H:%M"].map(|time| format!("{date}{time}"))).find_map(|form| {
+            if let Ok(time) = NaiveDateTime::parse_from_str(&text, &form).map(|time| time.and_utc()) {
+                return Some(stamp(time.timestamp(), time.timestamp_subsec_nanos(), Form::WithoutZone));
             }
             let time = DateTime::parse_from_str(&text.replace(['Z', 'z'], "+00:00"), &format!("{form}%#z")).ok()?;
-            Some(Self { nanoseconds: nanoseconds(time.timestamp(), time.timestamp_subsec_nanos()), has_zone: true })
+            Some(stamp(time.timestamp(), time.timestamp_subsec_nanos(), Form::WithZone))
         })
     }
 }
 
-/// True for a text that starts with a date, `2026-01-31`.
-pub(super) fn is_dated(text: &str) -> bool {
-    text.get(..10).is_some_and(is_date)
+/// True for a text that is a time of day, or starts with a date.
+pub(super) fn is_stamp(text: &str) -> bool {
+    is_dated(text) || Stamp::parse(text).is_some()
 }
 
-/// True for `2026-01-31`.
+fn is_dated(text: &str) -> bool {
+    text.split(['T', ' ']).next().is_some_and(is_date)
+}
+
+/// True for `2026-01-31` and `31.01.2026`.
 fn is_date(text: &str) -> bool {
-    let is_digit = |byte: u8| byte.is_ascii_digit();
-    text.len() == 10
-        && text.bytes().enumerate().all(|(at, byte)| if [4, 7].contains(&at) { byte == b'-' } else { is_digit(byte) })
+    let has_parts = |separator: char, digits: [(usize, usize); 3]| {
+        let parts: Vec<&str> = text.split(separator).collect();
+        parts.len() == 3 && parts.iter().zip(digits).all(|(part, (fewest, most))| is_digits(part, fewest, most))
+    };
+    has_parts('-', [(4, 4), (2, 2), (2, 2)]) || has_parts('.', [(1, 2), (1, 2), (4, 4)])
+}
+
+fn is_digits(text: &str, fewest: usize, most: usize) -> bool {
+    (fewest..=most).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 #[cfg(test)]
@@ -165,6 +204,14 @@ mod tests {
             ("2026-01-31 12:00:00Z", "2026-01-31 12:00:00.000000001-0000", Some(1e-9)),
             ("2026-01-31T12:00:00+01", "2026-01-31T12:00:00Z", Some(3600.0)),
             ("1969-12-31T23:59:59.5Z", "1970-01-01T00:00:00Z", Some(0.5)),
+            ("31.01.2026 23:59:58", "1.2.2026 00:00:00,25", Some(2.25)),
+            ("31.01.2026 23:59", "2026-01-31T23:59:01.5", Some(1.5)),
+            ("9:59:58.5", "10:00:00", Some(1.5)),
+            ("0:00:00,000", "100:00:00,500", Some(360_000.5)),
+            ("0:00:00", "0:60:00", None),
+            ("0:00:00", "59:58.5", None),
+            ("0:00:00", "12:00", None),
+            ("31.01.2026 12:00", "01/31/2026 12:00", None),
             ("2026-01-31T12:00:00", "2026-02-30T12:00:00", None),
             ("2026-01-31T12:00:00", "2026-01-31", None),
             ("2026-01-31T12:00:00", "2026-01-31T12:00:00 noon", None),
