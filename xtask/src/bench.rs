@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: ns per sample of the closed loop, and CPU time of identifications and diagnoses, compared with Python and C.
+//! `cargo xtask bench`: ns per sample of the closed loop, and CPU time of identifications and diagnoses, compared with Python and C; time of
+//! a fleet with one worker and with two.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Value, json};
 use xtask::{python, shell};
 
-use crate::{bench_records, package};
+use crate::{bench_fleet, bench_records, package};
 
 /// Samples in one run of a contender: 70 s at 1 kHz and the one at 0 s, as in `rivals.py` and the Rust bench.
 const SAMPLES: u32 = 70_001;
@@ -76,21 +77,26 @@ const CONTENDERS: [Contender; 12] = [
 /// Options of `cargo xtask bench`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Print the table as JSON
+    /// Print the tables as JSON
     #[arg(long)]
     json: bool,
-    /// Measure the closed loop or the records only
+    /// Measure one part only
     #[arg(long, value_enum)]
     only: Option<Part>,
+    /// Number of records of the fleet
+    #[arg(long, value_name = "N", default_value_t = 240, value_parser = clap::value_parser!(u32).range(1..))]
+    fleet_records: u32,
 }
 
-/// One of the two tables.
+/// One of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Part {
     /// The closed loop.
     ClosedLoop,
     /// Identification and diagnosis of records.
     Records,
+    /// A fleet of records with one worker and with two.
+    Fleet,
 }
 
 /// One line of the table.
@@ -120,18 +126,21 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if wants(Part::ClosedLoop) {
         find_bench(&shell::metadata()?)?;
     }
-    let python = python::environment(&target, "bench", "xtask/bench/requirements.txt")?;
-    let closed_loop = if wants(Part::ClosedLoop) { Some(closed_loop(&python, &target)?) } else { None };
-    let records = if wants(Part::Records) { Some(bench_records::measure(&python, &target)?) } else { None };
+    let python = || python::environment(&target, "bench", "xtask/bench/requirements.txt");
+    let closed_loop = wants(Part::ClosedLoop).then(|| closed_loop(&python()?, &target)).transpose()?;
+    let records = wants(Part::Records).then(|| bench_records::measure(&python()?, &target)).transpose()?;
+    let fleet = wants(Part::Fleet).then(|| bench_fleet::measure(&target, args.fleet_records)).transpose()?;
     if args.json {
         let mut report = report(closed_loop.as_deref().unwrap_or_default());
         report["records"] = records.unwrap_or_default();
+        report["fleet"] = fleet.unwrap_or_default();
         println!("{report}");
         return Ok(());
     }
     let closed_loop = closed_loop.map(|rows| table(&rows));
     let records = records.map(|records| bench_records::table(&records)).transpose()?;
-    print!("{}", closed_loop.into_iter().chain(records).collect::<Vec<String>>().join("\n"));
+    let fleet = fleet.map(|fleet| bench_fleet::table(&fleet)).transpose()?;
+    print!("{}", closed_loop.into_iter().chain(records).chain(fleet).collect::<Vec<String>>().join("\n"));
     Ok(())
 }
 

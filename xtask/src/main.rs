@@ -2,6 +2,7 @@
 //! this binary starts.
 
 mod bench;
+mod bench_fleet;
 mod bench_records;
 mod check;
 mod counts;
@@ -122,11 +123,17 @@ Examples:
     Capi(Forwarded),
     /// Compare the host's speed with Python's
     ///
-    /// Runs the report's closed loop, 70 s at 1 kHz, in scipy, numba, C and Rust, in turns. Marks a time of Rust's above
-    /// its bound, a multiple of that of the fastest rival that does the same work.
+    /// closed-loop: the report's loop, 70 s at 1 kHz, in scipy, numba, C and Rust, in turns.
+    /// records: CPU time of identifications and diagnoses, and of SciPy's output-error fits of the same records.
+    /// fleet: time of `python -m vsj.fleet` with one worker and with two.
+    ///
+    /// What is beyond its bound is marked and is no error. Takes half an hour on a quiet machine.
     #[command(
         verbatim_doc_comment,
-        after_help = "Example:\n  cargo xtask bench --json | jq '.rows[] | {name, to_rival, met}'"
+        after_help = "\
+Examples:
+  cargo xtask bench --only fleet --fleet-records 400
+  cargo xtask bench --json | jq '.rows[] | {name, to_rival, met}'"
     )]
     Bench(bench::Args),
     /// Install the Python package in a virtual environment and run its tests

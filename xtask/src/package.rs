@@ -6,9 +6,10 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use xtask::{build, python, shell};
 
-/// Folder of the package, a workspace of its own, and the packages that its tests need.
+/// Folder of the package, a workspace of its own.
 const FOLDER: &str = "./python";
-const REQUIREMENTS: &str = "python/requirements.txt";
+/// The packages that its tests need, those of the fleet included.
+pub(crate) const REQUIREMENTS: &str = "python/requirements.txt";
 
 /// Options of `cargo xtask python`.
 #[derive(clap::Args)]

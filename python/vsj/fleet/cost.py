@@ -5,11 +5,12 @@ the scheduler and this program, by running empty tasks. What is computed, for R 
 
     CPU time           R s                       s: mean CPU time of a record
     limit of the cores R s / C
-    limit of one task  (R / B) o                 o: time of an empty task, one after the other in the scheduler
-    limit of the store 3 (R / B) / 3500 s        a part is one PUT, COPY and DELETE,
-                       (R + 2 R / B) / 5500 s    and two GETs at the end; a record is one GET
-    the end            2 (R / B) 0.1 s / 32      the parts are read twice, 32 at a time
-    time               the largest limit, B s for the last batch, and the end
+    tasks              T = R / B + C ln B        the last C B records are in smaller batches; fewer than R
+    limit of the scheduler  T o                  o: time of an empty task, one after the other
+    limit of the store 3 T / 3500 s              a part is one PUT, COPY and DELETE,
+                       (R + 2 T) / 5500 s        and two GETs at the end; a record is one GET
+    the end            2 T 0.1 s / 32            the parts are read twice, 32 at a time
+    time               the largest limit, s for the last record, and the end
     cores that help    B s / o                   with more the scheduler is the bottleneck
 
 3500 and 5500 are the requests of each kind in a second that Amazon S3 guarantees for one prefix, 0.1 s is the lower end of the latency that
@@ -17,6 +18,7 @@ it names for small objects (its user guide, "Best practices design patterns: opt
 """
 
 import dataclasses
+import math
 import posixpath
 import time
 
@@ -105,7 +107,7 @@ def _nothing(number):
 
 def estimate(it, count, cores, price, batch):
     """The cost of ``count`` records on ``cores`` cores."""
-    tasks = -(-count // batch)
+    tasks = min(count, count / batch + cores * math.log(batch))
     cpu_s = count * it.seconds
     limits = {
         "cores": cpu_s / cores,
@@ -114,7 +116,7 @@ def estimate(it, count, cores, price, batch):
     }
     bottleneck = max(limits, key=limits.get)
     end_s = 2 * tasks * GET_S / store.READERS
-    time_s = limits[bottleneck] + batch * it.seconds + end_s
+    time_s = limits[bottleneck] + it.seconds + end_s
     return Estimate(
         records=count,
         cores=cores,

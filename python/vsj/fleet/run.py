@@ -20,6 +20,14 @@ _AHEAD = 3
 """Batches in progress for each thread of a worker: one that is computed, and two that wait there."""
 
 
+def next_size(left, batch_size, threads):
+    """Number of records in the next batch: ``batch_size``, and towards the end the part of what is ``left`` that each thread has.
+
+    So at the end the threads wait for one record at most, not for a batch (guided self-scheduling, Polychronopoulos and Kuck 1987).
+    """
+    return min(batch_size, -(-left // threads))
+
+
 class SchedulerLost(ConnectionError):
     """The scheduler has gone, and with it the work in progress."""
 
@@ -84,7 +92,7 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
     folder, out : str
         Addresses of records and results.
     batch_size : int
-        Records in one task and one part.
+        Most records in one task and one part.
     on_progress : callable
         Called with the :class:`Outcome` after each batch.
 
@@ -112,14 +120,16 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
         in_progress[future] = (start, rows, alone)
         return future
 
-    in_progress, set_aside = {}, []
-    batches = (batch(start, batch_size) for start in range(0, len(records), batch_size))
+    in_progress, set_aside, following = {}, [], 0
     completed = as_completed()
 
     def fill():
-        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        while len(in_progress) < ahead and (following := next(batches, None)):
-            completed.add(submit(*following))
+        nonlocal following
+        threads = max(1, sum(client.nthreads().values()))
+        while len(in_progress) < _AHEAD * threads and following < len(records):
+            size = next_size(len(records) - following, batch_size, threads)
+            completed.add(submit(*batch(following, size)))
+            following += size
         if not in_progress and set_aside:
             completed.add(submit(*set_aside.pop(0), alone=True))
 
