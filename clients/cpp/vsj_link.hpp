@@ -62,6 +62,8 @@ namespace wire {
 constexpr std::uint8_t version = 5;
 constexpr std::uint8_t request_kind = 'Q';
 constexpr std::uint8_t reply_kind = 'A';
+/// What comes with the telemetry without a request.
+constexpr std::uint8_t notice_kind = 'N';
 /// Largest number of bytes between two delimiters.
 constexpr std::size_t most_encoded = 130;
 
@@ -256,6 +258,53 @@ struct Sample {
         sample.mismatch = from.byte();
         sample.sensor = from.byte();
         return sample;
+    }
+};
+
+/// What the isolation bank says of the spring and its sensor; it comes with the telemetry.
+struct Isolation {
+    /// Number of the tick, and the one after which the fault has been there, 0 without an alarm; counted from the start.
+    std::uint64_t tick = 0, since_tick = 0;
+    /// Upper byte: 0 quiet, 1 alarm, 2 unknown, 3 named, 4 ambiguous, 5 off. Lower byte: numbers of the causes, or why it is off.
+    std::uint16_t verdict = 0;
+    /// Size of the cause and half the width of its 95 % interval, in the unit of docs/isolation.md; 0 without a cause.
+    double size = 0, half_width = 0;
+    /// Part of the residual's energy that the cause explains, 0 to 1.
+    double explained = 0;
+    /// Causes that are a fault once they are named: bit 0 for number 0.
+    std::uint16_t trip_on_cause = 0;
+
+    /// `quiet`, `alarm`, `unknown`, `named`, `ambiguous` or `off`.
+    const char* word() const {
+        static const char* const words[] = {"quiet", "alarm", "unknown", "named", "ambiguous", "off"};
+        return verdict >> 8 < 6 ? words[verdict >> 8] : "unknown-code";
+    }
+    /// Name of the cause that explains most; empty unless one is named or two are ambiguous.
+    const char* cause() const { return has_cause() ? cause_name(verdict & 15) : ""; }
+    /// Name of the other cause; empty unless two are ambiguous.
+    const char* other() const { return verdict >> 8 == 4 ? cause_name(verdict >> 4 & 15) : ""; }
+
+    static Isolation read(wire::Reader& from) {
+        Isolation said;
+        said.tick = from.number();
+        said.verdict = static_cast<std::uint16_t>(from.number());
+        said.since_tick = from.number();
+        said.size = from.real();
+        said.half_width = from.real();
+        said.explained = from.real();
+        said.trip_on_cause = static_cast<std::uint16_t>(from.number());
+        return said;
+    }
+
+private:
+    bool has_cause() const { return verdict >> 8 == 3 || verdict >> 8 == 4; }
+    static const char* cause_name(unsigned number) {
+        static const char* const names[] = {
+            "gain-error",        "instantaneous-share", "time-constant", "voltage-dependent-time-constant",
+            "second-relaxation", "charge-leakage",      "hysteresis",    "static-nonlinearity",
+            "amplifier-limit",   "amplifier-slew",      "delay",         "series-lag",
+            "reading-offset",    "drift",               "sensor-saturation", "stuck-sensor"};
+        return names[number];
     }
 };
 
@@ -461,6 +510,7 @@ public:
         status();
         // Telemetry sent before the greeting belongs to an earlier program.
         samples_.clear();
+        isolation_.reset();
         const double beat_s = std::clamp(status_.silence_limit_s / 5.0, 0.01, 1.0);
         beat_ = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(beat_s));
         beating_ = std::thread([this] { heartbeats(); });
@@ -520,6 +570,13 @@ public:
         samples_.clear();
         every_ticks_ = static_cast<std::uint16_t>(ticks);
         order(wire::Writer().byte(7).number(every_ticks_).bytes);
+    }
+
+    /// What the isolation bank has said last with the telemetry: when its verdict changes, and once per second. Nothing without
+    /// telemetry, and from a program without it.
+    std::optional<Isolation> isolation() {
+        const Lock lock(mutex_);
+        return isolation_;
     }
 
     /// Telemetry that arrives within `wait`.
@@ -597,6 +654,7 @@ private:
     Bytes encoded_;
     std::deque<std::uint8_t> received_;
     std::deque<Sample> samples_;
+    std::optional<Isolation> isolation_;
     /// Numbers of the reports of faults whose receipt the microcontroller does not know of yet.
     std::set<std::uint32_t> unheard_;
     Clock::duration beat_{};
@@ -657,6 +715,7 @@ private:
     /// Asks for a new session, which the next request begins.
     void begin() {
         session_ = 0;
+        isolation_.reset();
         status_ = read_status(exchange({0}));
         requests_ = 0;
     }
@@ -711,7 +770,9 @@ private:
                 }
                 auto packet = encoded_.size() <= wire::most_encoded ? wire::open(encoded_) : std::nullopt;
                 encoded_.clear();
-                if (!packet || packet->kind != wire::reply_kind || packet->message.empty()) continue;
+                if (!packet || packet->message.empty()) continue;
+                if (packet->kind == wire::notice_kind && packet->version == wire::version) notice(packet->message);
+                if (packet->kind != wire::reply_kind) continue;
                 if (packet->version != wire::version) return packet;
                 wire::Reader from(packet->message);
                 const auto code = from.number();
@@ -728,6 +789,13 @@ private:
             const Bytes bytes = port_.read(until);
             received_.insert(received_.end(), bytes.begin(), bytes.end());
         }
+    }
+
+    void notice(const Bytes& message) {
+        wire::Reader from(message);
+        const bool is_isolation = from.number() == 0;
+        const Isolation said = Isolation::read(from);
+        if (is_isolation && from.is_whole()) isolation_ = said;
     }
 
     [[noreturn]] void refuse(const Bytes& reason) const {

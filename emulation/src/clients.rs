@@ -12,11 +12,15 @@ use anyhow::{Context, Result, ensure};
 use xtask::build::{self, Board, Opt};
 use xtask::{setup, shell};
 
+use crate::binary::size;
 use crate::qemu::emulator;
 use crate::watch;
 
 /// Longest wait for the emulator's socket.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// Variables that name the board, and the one with an isolation bank, to the tests of the Python package.
+const PYTHON_BOARD: &str = "VSJ_BOARD";
+const PYTHON_BANK: &str = "VSJ_BOARD_WITH_BANK";
 /// Folder of the C++ client and its tests.
 const CPP: &str = "clients/cpp";
 
@@ -26,15 +30,17 @@ pub(crate) fn run() -> Result<()> {
     setup::cxx()?;
     let cmake = setup::cmake()?;
     let elf = build::image(Board::Mps2, Opt::S)?;
+    let with_bank = build::image_with(size::ISOLATION, Board::Mps2, Opt::S)?;
     let target = shell::target_directory()?;
     let vsj = build::vsj()?;
-    cpp(&cmake, &elf, &target)?;
-    python(&vsj, &elf, &target)?;
+    cpp(&cmake, &elf, &with_bank, &target)?;
+    python(&vsj, &elf, PYTHON_BOARD, &target)?;
+    python(&vsj, &with_bank, PYTHON_BANK, &target)?;
     watch::run(&vsj, &elf).context("vsj watch --emulated")
 }
 
-/// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board.
-fn cpp(cmake: &Path, elf: &Path, target: &Path) -> Result<()> {
+/// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board without and with an isolation bank.
+fn cpp(cmake: &Path, elf: &Path, with_bank: &Path, target: &Path) -> Result<()> {
     let built = target.join("clients-cpp");
     let source = shell::root().join(CPP);
     shell::run(shell::command(cmake).arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))?;
@@ -46,6 +52,11 @@ fn cpp(cmake: &Path, elf: &Path, target: &Path) -> Result<()> {
         command.arg(port).arg(folder.path().join("record.csv"));
         command
     })?;
+    on_board(with_bank, "cpp", |port| {
+        let mut command = shell::command(built.join("isolation"));
+        command.arg(port);
+        command
+    })?;
     // The manual's first step.
     on_board(elf, "cpp", |port| {
         let mut command = shell::command(built.join("step"));
@@ -54,14 +65,14 @@ fn cpp(cmake: &Path, elf: &Path, target: &Path) -> Result<()> {
     })
 }
 
-/// Runs the tests of the Python package that need a board.
-fn python(vsj: &Path, elf: &Path, target: &Path) -> Result<()> {
+/// Runs the tests of the Python package that need a board, whose port they read from `variable`.
+fn python(vsj: &Path, elf: &Path, variable: &str, target: &Path) -> Result<()> {
     let python = target.join("python-venv/bin/python");
     ensure!(python.exists(), "{} is missing: run cargo xtask python", python.display());
     on_board(elf, "python", |port| {
         let mut command = shell::command(&python);
         command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests/test_link.py"]);
-        command.env("VSJ", vsj).env("VSJ_BOARD", port);
+        command.env("VSJ", vsj).env(variable, port);
         command
     })
 }

@@ -7,7 +7,8 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant, SystemTime};
 
 use link::{
-    FaultReport, Frame, Nonce, Packet, Reason, Receiver, Reply, Request, Sequence, Status, Telemetry, Unreadable,
+    FaultReport, Frame, IsolationReport, Nonce, Notice, Packet, Reason, Receiver, Reply, Request, Sequence, Status,
+    Telemetry, Unreadable,
 };
 
 use crate::failure::Failure;
@@ -52,6 +53,8 @@ pub struct Client {
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
+    /// What the isolation bank said last with the telemetry of this session.
+    verdict: Option<IsolationReport>,
     /// Reports of faults whose receipt the MCU does not know of yet.
     unheard: Vec<FaultReport>,
     reports: Vec<FaultReport>,
@@ -90,6 +93,7 @@ impl Client {
             read,
             bytes: 0,
             samples,
+            verdict: None,
             unheard,
             reports,
         };
@@ -98,6 +102,7 @@ impl Client {
         let status = client.status()?;
         // Telemetry sent before the greeting belongs to an earlier program.
         client.samples.clear();
+        client.verdict = None;
         Ok((client, status))
     }
 
@@ -110,6 +115,12 @@ impl Client {
     /// that this program has heard of it.
     pub fn reports(&mut self) -> Vec<FaultReport> {
         std::mem::take(&mut self.reports)
+    }
+
+    /// What the isolation bank has said last with the telemetry of this session: when its verdict changes, and once per second. `None`
+    /// without telemetry, and if the MCU's program has no bank or does not send what it says.
+    pub fn verdict(&self) -> Option<IsolationReport> {
+        self.verdict
     }
 
     /// Waits for `wait` and returns all telemetry received.
@@ -125,7 +136,7 @@ impl Client {
 
     /// Asks for a new session; the next request begins it.
     pub(crate) fn begin(&mut self) -> Result<(), Failure> {
-        self.session = Nonce::NONE;
+        (self.session, self.verdict) = (Nonce::NONE, None);
         status(self.exchange(Request::Hello)?)?;
         self.requests = 0;
         Ok(())
@@ -200,8 +211,14 @@ impl Client {
                     }
                     Ok(reply) => return Ok(Some(answer(&packet, Ok(reply)))),
                     Err(Unreadable::Version(version)) => return Ok(Some(answer(&packet, Err(version)))),
-                    // An echo of our own frame, or a message unknown to this version.
-                    Err(Unreadable::Kind | Unreadable::Message) => {}
+                    Err(Unreadable::Kind) => {
+                        // Otherwise an echo of our own frame.
+                        if let Ok(Notice::Isolation(report)) = packet.read() {
+                            self.verdict = Some(report);
+                        }
+                    }
+                    // Unknown to this version.
+                    Err(Unreadable::Message) => {}
                 }
             }
             if Instant::now() >= until {
@@ -241,6 +258,9 @@ mod tests {
     use std::os::unix::net::UnixListener;
     use std::thread::JoinHandle;
 
+    /// What the isolation bank of the MCU says.
+    const VERDICT: u16 = 0x302;
+
     /// An MCU on a socket that answers until its host hangs up, and then returns its counters. One tick per exchange, at a rate at
     /// which reports of faults are repeated in each. `standing` is the faults that stand in a tick. The settings have no end.
     fn mcu(listener: UnixListener, standing: fn(u64) -> Faults) -> Counters {
@@ -271,6 +291,10 @@ mod tests {
                 }
             }
             stream.write_all(server.telemetry(&view).unwrap_or_default()).unwrap();
+            if server.verdict_due(VERDICT, &view) {
+                let report = IsolationReport { verdict: VERDICT, tick: sample.tick, ..IsolationReport::default() };
+                stream.write_all(server.verdict(VERDICT, &Notice::Isolation(report), &view)).unwrap();
+            }
         }
     }
 
@@ -289,6 +313,18 @@ mod tests {
         let (mut client, thread) = connected(|_| Faults::NONE);
         let failure = client.read_settings(true).unwrap_err();
         assert!(matches!(failure, Failure::UnknownSettings), "{failure}");
+        drop(client);
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn a_verdict_that_comes_with_the_telemetry_is_forgotten_with_its_session() {
+        let (mut client, thread) = connected(|_| Faults::NONE);
+        client.order(Request::Stream { every_ticks: 1 }).unwrap();
+        client.order(Request::Stream { every_ticks: 0 }).unwrap();
+        assert_eq!(client.verdict().map(|report| report.verdict), Some(VERDICT));
+        client.begin().unwrap();
+        assert_eq!(client.verdict(), None);
         drop(client);
         thread.join().unwrap();
     }

@@ -37,9 +37,9 @@ const HEADER: usize = 4;
 const SESSION: usize = 4;
 const CHECKSUM: usize = 4;
 
-/// A request or a reply.
+/// A request, a reply or a notice.
 pub trait Message: Serialize + DeserializeOwned {
-    /// Byte that identifies the direction, so that a host does not accept the echo of its own request as a reply.
+    /// Byte that identifies the type of the message, so that a host does not accept the echo of its own request as a reply.
     const KIND: u8;
 }
 
@@ -100,7 +100,7 @@ impl Frame {
 pub struct Packet<'a> {
     /// Protocol version of the sender.
     pub version: u8,
-    /// Direction of the message, see [`Message::KIND`].
+    /// Type of the message, see [`Message::KIND`].
     pub kind: u8,
     /// Sequence number of the request, or of the telemetry sample.
     pub sequence: Sequence,
@@ -113,7 +113,7 @@ pub struct Packet<'a> {
 /// Why a packet with a correct CRC is not a message of the expected type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unreadable {
-    /// The packet is of the other direction, for example an echo.
+    /// The message is of another type, for example an echo.
     Kind,
     /// The packet is of another protocol version, given here.
     Version(u8),

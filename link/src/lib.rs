@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | frame | The bytes on the wire between two `0x00` delimiters: one packet, encoded with COBS. |
 //! | packet | Version, kind, sequence number, message and CRC-32C. |
-//! | message | A [`Request`] of the host or a [`Reply`] of the MCU, serialised with postcard. |
+//! | message | A [`Request`] of the host, or a [`Reply`] or [`Notice`] of the MCU, serialised with postcard. |
 //! | sequence number | 16-bit request counter modulo 65 536; a reply carries the number of its request. |
 //! | session | At most 65 536 requests of one host after its `Hello`, each with the session's nonce. |
 //! | nonce | 32-bit number of a session, which the MCU gives: no other session has it. |
@@ -16,11 +16,12 @@
 //! frame = 0x00, COBS( version, kind, sequence (2 bytes), postcard(message), session (4 bytes), CRC-32C (4 bytes) ), 0x00
 //! ```
 //!
-//! The host sends requests, the MCU replies. Apart from replies the MCU sends telemetry on request, and reports of faults.
+//! The host sends requests, the MCU replies. Apart from replies the MCU sends telemetry on request, notices with it, and reports of
+//! faults.
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`request`], [`reply`], [`reason`] | The messages. |
+//! | [`request`], [`reply`], [`reason`], [`notice`] | The messages. |
 //! | [`telemetry`] | One sample of the control loop, and the state of the output. |
 //! | [`value`] | Voltages and desired stiffness in their wire format. |
 //! | [`block`] | Blocks that the MCU stores: their identity, and the parts in which they are sent. |
@@ -53,6 +54,7 @@ pub mod field;
 pub mod frame;
 pub mod isolation;
 pub mod nonce;
+pub mod notice;
 pub mod reason;
 pub mod receiver;
 pub mod reply;
@@ -75,6 +77,7 @@ pub use field::Field;
 pub use frame::{Frame, Message, Packet, Unreadable};
 pub use isolation::IsolationReport;
 pub use nonce::{Nonce, Stamp};
+pub use notice::Notice;
 pub use reason::Reason;
 pub use receiver::Receiver;
 pub use reply::{Controller, FaultReport, Reply, Status};

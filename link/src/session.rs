@@ -25,6 +25,7 @@ use core::cmp::Ordering;
 
 use crate::frame::{Frame, Packet, Unreadable};
 use crate::nonce::{Nonce, Nonces, Stamp};
+use crate::notice::Notice;
 use crate::reason::Reason;
 use crate::receiver::Receiver;
 pub use crate::reply::Counters;
@@ -101,6 +102,9 @@ pub struct Session {
     every_ticks: u16,
     pushed_at: u64,
     pushed: Sequence,
+    /// Code of the verdict that was last sent with this telemetry, and when.
+    noticed: Option<u16>,
+    noticed_at: u64,
 }
 
 impl Session {
@@ -132,6 +136,8 @@ impl Session {
             every_ticks: 0,
             pushed_at: 0,
             pushed: Sequence(0),
+            noticed: None,
+            noticed_at: 0,
         }
     }
 
@@ -200,7 +206,7 @@ impl Session {
         self.heard_at = Some(now);
         self.heard = true;
         if let Request::Stream { every_ticks } = request {
-            (self.every_ticks, self.pushed_at) = (every_ticks, now);
+            (self.every_ticks, self.pushed_at, self.noticed) = (every_ticks, now, None);
         }
         Action::Apply(request)
     }
@@ -247,6 +253,26 @@ impl Session {
         self.pushed = self.pushed.next();
         self.outgoing = Frame::new(self.nonce().stamp(self.pushed), &Reply::Telemetry(sample));
         self.outgoing.as_bytes()
+    }
+
+    /// True if at tick `now` telemetry is being sent, and the isolation bank's verdict with this code was not sent with it within the
+    /// last `period_ticks`.
+    pub fn verdict_due(&self, verdict: u16, now: u64, period_ticks: u32) -> bool {
+        let is_new = self.noticed != Some(verdict);
+        let is_old = now.saturating_sub(self.noticed_at) >= u64::from(period_ticks);
+        self.every_ticks != 0 && (is_new || is_old) && !self.host_silent(now)
+    }
+
+    /// Encodes a notice with the verdict of this code at tick `now`; its sequence number is that of the last telemetry sample.
+    pub fn verdict(&mut self, verdict: u16, notice: &Notice, now: u64) -> &[u8] {
+        (self.noticed, self.noticed_at) = (Some(verdict), now);
+        self.outgoing = Frame::new(self.nonce().stamp(self.pushed), notice);
+        self.outgoing.as_bytes()
+    }
+
+    /// The last notice did not arrive on the line: it is due again.
+    pub fn drop_verdict(&mut self) {
+        self.noticed = None;
     }
 
     /// Counts samples that were due and did not arrive on the line.

@@ -11,7 +11,7 @@ use link::reply::Firmware;
 use link::session::Counters;
 use link::{
     AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, IsolationReport, Message,
-    Mismatch, Nonce, Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    Mismatch, Nonce, Notice, Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
 };
 
 /// Returns the message and its frame as a line of the file for other clients.
@@ -229,6 +229,21 @@ fn replies() {
         }
     }
     check_file("replies.txt", &frames);
+}
+
+#[test]
+fn notices() {
+    let report = IsolationReport {
+        tick: 70_000,
+        verdict: 0x4a0,
+        since_tick: 300,
+        size: 0.25,
+        half_width: 1.0,
+        explained: 0.0,
+        trip_on_cause: 0x8001,
+    };
+    let golden = "00f0a204a009ac02000000000000d03f000000000000f03f0000000000000000818002";
+    check_file("notices.txt", &check(&Notice::Isolation(report), b'N', golden));
 }
 
 /// The bytes of one complete frame on the wire.

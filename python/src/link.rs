@@ -10,8 +10,9 @@ use anyhow::{Context, Result};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
-use link_host::{Client, Failure, Patience, Row, StatusReport, heartbeat};
+use link_host::{Client, Failure, IsolationRow, Patience, Row, StatusReport, heartbeat};
 use pyo3::prelude::*;
+use serde_json::json;
 use simulation::settings_file::{SettingsFile, Source};
 use simulation::{BadInput, bad_input, plant_file};
 
@@ -195,14 +196,19 @@ impl Port {
         })
     }
 
-    /// Telemetry that arrives within a few milliseconds, as a JSON array.
+    /// Telemetry that arrives within a few milliseconds, as a JSON array, each sample with what the isolation bank has said last.
     fn samples(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |it| {
             it.beat()?;
             let (name, rate_hz) = (it.name(), it.status.rate_hz);
-            let samples = it.client.samples(TURN).with_context(|| name)?;
-            let rows: Vec<Row> = samples.map(|sample| Row::new(&sample, rate_hz)).collect();
-            Ok(serde_json::to_string(&rows)?)
+            let samples: Vec<_> = it.client.samples(TURN).with_context(|| name)?.collect();
+            let isolation = json!(it.client.verdict().map(|report| IsolationRow::new(&report, rate_hz)));
+            let row = |sample| {
+                let mut row = json!(Row::new(sample, rate_hz));
+                row["isolation"] = isolation.clone();
+                row
+            };
+            Ok(serde_json::to_string(&samples.iter().map(row).collect::<Vec<_>>())?)
         })
     }
 

@@ -18,6 +18,14 @@ def board():
     return port
 
 
+@pytest.fixture
+def board_with_bank():
+    port = os.environ.get("VSJ_BOARD_WITH_BANK")
+    if port is None:
+        pytest.skip("no board with an isolation bank; cargo xtask clients starts one")
+    return port
+
+
 def test_a_port_that_is_none_is_bad_input_with_the_words_of_the_command(command):
     port = "unix:/nonexistent/link"
     with pytest.raises(vsj.BadInput) as raised:
@@ -113,3 +121,20 @@ def test_model_and_settings_are_sent_checked_and_run(board, tmp_path):
         with pytest.raises(vsj.BadInput, match="proportional"):
             link.settings(settings)
         assert link.status()["sample"]["state"] == "disarmed"
+
+
+def test_the_verdict_of_the_isolation_bank_comes_with_the_telemetry(board_with_bank):
+    with vsj.Link(board_with_bank, timeout=5) as link:
+        samples = list(link.watch(rate_hz=50, seconds=1))
+    # A board at rest gives the bank nothing to name.
+    said = samples[-1].isolation
+    assert (said.verdict, said.why, said.cause, said.size) == ("quiet", None, None, None)
+    assert {said} == {sample.isolation for sample in samples[20:]}
+
+
+def test_a_verdict_has_size_and_interval_of_its_cause():
+    row = {"verdict": "named", "cause": "drift", "other": None, "since_s": 2.5, "explained": 0.99, "why": None}
+    size = {"value": 0.5, "low": 0.25, "high": 0.75, "unit": "1/s"}
+    said = vsj.Isolation._of({**row, "time_s": 3.0, "size": size, "trip_on_cause": []})
+    assert said == vsj.Isolation(**row, size=0.5, low=0.25, high=0.75, unit="1/s")
+    assert vsj.Isolation._of(None) is None

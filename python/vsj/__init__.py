@@ -18,7 +18,7 @@ from ._vsj import BadInput, LinkError
 from .analysis import diagnose, identify, plan
 from .answers import Diagnosis, Finding, Identified, Parameter, Plan, Quantity, Suspect
 from .control import Controller, Feedback, Limit, Run, simulate
-from .link import Link, Sample
+from .link import Isolation, Link, Sample
 from .records import RecordWarning
 from .spring import Spring
 
@@ -31,6 +31,7 @@ __all__ = [
     "Feedback",
     "Finding",
     "Identified",
+    "Isolation",
     "Limit",
     "Link",
     "LinkError",

@@ -14,6 +14,46 @@ from .analysis import named_plant
 
 
 @dataclass(frozen=True)
+class Isolation:
+    """What the isolation bank of the MCU says of the spring and its sensor.
+
+    Attributes
+    ----------
+    verdict
+        ``"quiet"``, ``"alarm"``, ``"named"``, ``"ambiguous"``, ``"unknown"``, or ``"off"`` if no bank runs.
+    cause, other
+        The cause that explains most, and the other one if two are ambiguous; ``None`` otherwise.
+    since_s
+        When the fault began, in s since the MCU's start; ``None`` without an alarm.
+    size, low, high, unit
+        Size of the cause with its 95 % interval; ``None`` without a cause, the unit is empty for a ratio.
+    explained
+        Part of the residual's energy that the cause explains, 0 to 1; ``None`` without a cause.
+    why
+        Why no bank runs, ``None`` if one does.
+    """
+
+    verdict: str
+    cause: Optional[str]
+    other: Optional[str]
+    since_s: Optional[float]
+    size: Optional[float]
+    low: Optional[float]
+    high: Optional[float]
+    unit: Optional[str]
+    explained: Optional[float]
+    why: Optional[str]
+
+    @classmethod
+    def _of(cls, row: Optional[Dict[str, Any]]) -> "Optional[Isolation]":
+        if row is None:
+            return None
+        size = row["size"] or {}
+        sizes = {"size": size.get("value"), "low": size.get("low"), "high": size.get("high"), "unit": size.get("unit")}
+        return cls(**{name: {**row, **sizes}[name] for name in cls.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
 class Sample:
     """One sample of the control loop; voltages and stiffnesses in V, a stiffness as the equivalent static voltage.
 
@@ -33,6 +73,8 @@ class Sample:
         Names of the limits that acted: ``"upper"``, ``"lower"``, ``"slew"``, ``"target"``.
     monitors, sensor
         What disagrees with the output, and the diagnosis of the sensor.
+    isolation
+        What the isolation bank has said last; ``None`` before it has, and if the MCU's program does not send it.
     """
 
     time_s: float
@@ -46,11 +88,12 @@ class Sample:
     limits: Tuple[str, ...]
     monitors: str
     sensor: str
+    isolation: Optional[Isolation] = None
 
     @classmethod
     def _of(cls, row: Dict[str, Any]) -> "Sample":
         known = {name: row[name] for name in cls.__dataclass_fields__}
-        return cls(**{**known, "limits": tuple(row["limits"])})
+        return cls(**{**known, "limits": tuple(row["limits"]), "isolation": Isolation._of(row["isolation"])})
 
 
 class Link:

@@ -64,6 +64,17 @@ int check(const std::string& path, std::uint8_t kind) {
             expect(from.is_whole() && sample.time_s == 70.0 && sample.applied_v == -1.0 / 1048576 && sample.sensor == 4,
                    "another sample: " + line);
         }
+        if (kind == vsj::wire::notice_kind) {
+            const vsj::Bytes content = bytes(message);
+            vsj::wire::Reader from(content);
+            expect(from.byte() == 0, "another notice: " + line);
+            const auto said = vsj::Isolation::read(from);
+            expect(from.is_whole() && said.tick == 70'000 && said.since_tick == 300 && said.size == 0.25 &&
+                       said.half_width == 1.0 && said.explained == 0.0 && said.trip_on_cause == 0x8001 &&
+                       said.word() == std::string("ambiguous") && said.cause() == std::string("gain-error") &&
+                       said.other() == std::string("delay"),
+                   "another verdict: " + line);
+        }
         ++count;
     }
     return count;
@@ -76,9 +87,10 @@ int main(int argc, char** argv) {
     const std::string folder = argv[1];
     const int requests = check(folder + "/requests.txt", vsj::wire::request_kind);
     const int replies = check(folder + "/replies.txt", vsj::wire::reply_kind);
-    expect(requests >= 20 && replies >= 20, "files without frames");
+    const int notices = check(folder + "/notices.txt", vsj::wire::notice_kind);
+    expect(requests >= 20 && replies >= 20 && notices >= 1, "files without frames");
     const vsj::Bytes set = vsj::wire::Writer().byte(2).byte(0).real(300.0).bytes;
     expect(set == bytes("02000000000000c07240"), "another request to set");
-    std::printf("%d requests, %d replies\n", requests, replies);
+    std::printf("%d requests, %d replies, %d notices\n", requests, replies, notices);
     return failures == 0 ? 0 : 1;
 }

@@ -75,6 +75,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
             {
                 server.telemetry_lost();
             }
+            if !send_verdict(line, server, &view).await {
+                server.verdict_lost();
+            }
         }
     }
 }
@@ -84,6 +87,17 @@ async fn report_faults(line: &mut impl Line, server: &mut Server, view: &View) {
     while let Some(bytes) = server.fault(view) {
         send(line, bytes).await;
     }
+}
+
+/// Sends what the isolation bank says with the telemetry, if it is due. False after a timeout.
+async fn send_verdict(line: &mut impl Line, server: &mut Server, view: &View) -> bool {
+    let Some((verdict, notice)) = isolation::notice(view.sample.tick, |verdict| server.verdict_due(verdict, view))
+    else {
+        return true;
+    };
+    // The notice is not kept while the frame is sent.
+    let bytes = server.verdict(verdict, &notice, view);
+    send(line, bytes).await
 }
 
 /// Sends a frame. False after a timeout: the frame is incomplete then, and the host drops it.

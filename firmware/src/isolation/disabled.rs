@@ -1,7 +1,7 @@
 //! Stand-ins without values, built without the feature `isolation`.
 
 use link::isolation::{Isolation as Request, Off};
-use link::{Command, IsolationReport, Reply};
+use link::{Command, IsolationReport, Notice, Reply};
 use model::isolation::Causes;
 use model::supervisor::{Fault, State};
 use model::{OutOfRange, Plant, device};
@@ -67,6 +67,11 @@ pub fn publish(news: &News, _: u64) {
 /// Without the feature `isolation` there is nothing to acknowledge.
 pub fn take_acknowledged() -> bool {
     false
+}
+
+/// Without the feature `isolation` there is nothing to send with the telemetry.
+pub fn notice(_: u64, _: impl FnOnce(u16) -> bool) -> Option<(u16, Notice)> {
+    None
 }
 
 /// Replies that the image is built without the bank.

@@ -7,11 +7,11 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket}
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
-use link::Telemetry;
+use link::{IsolationReport, Telemetry};
 use serde_json::json;
 use simulation::bad_input;
 
-use crate::link::Row;
+use crate::link::{IsolationRow, Row};
 
 /// Default address of PlotJuggler's UDP server.
 pub const PLOT_JUGGLER: &str = "127.0.0.1:9870";
@@ -49,8 +49,9 @@ impl Datagrams {
         }
     }
 
-    /// Sends a sample. Its time is that of the first sample's arrival and the MCU's clock since then.
-    pub fn send(&mut self, sample: &Telemetry) {
+    /// Sends a sample with what the isolation bank has said last. Its time is that of the first sample's arrival and the MCU's clock
+    /// since then.
+    pub fn send(&mut self, sample: &Telemetry, verdict: Option<&IsolationReport>) {
         let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
         let (tick, start_s) = match self.first {
             // The MCU has restarted.
@@ -60,7 +61,7 @@ impl Datagrams {
         };
         self.first = Some((tick, start_s));
         let timestamp = start_s + (sample.tick - tick) as f64 / f64::from(self.rate_hz.max(1));
-        let text = object(sample, self.rate_hz, timestamp).to_string();
+        let text = object(sample, verdict, self.rate_hz, timestamp).to_string();
         match self.socket.send_to(text.as_bytes(), self.to) {
             Ok(_) => self.sent += 1,
             Err(_) => self.not_sent += 1,
@@ -68,11 +69,15 @@ impl Datagrams {
     }
 }
 
-/// The object of a sample. Names of states and limits are also there as numbers, which alone can be plotted.
-fn object(sample: &Telemetry, rate_hz: u32, timestamp: f64) -> serde_json::Value {
+/// The object of a sample. Names of states, limits and verdicts are also there as numbers, which alone can be plotted.
+fn object(sample: &Telemetry, verdict: Option<&IsolationReport>, rate_hz: u32, timestamp: f64) -> serde_json::Value {
     let mut row = json!(Row::new(sample, rate_hz));
     row["state_code"] = json!(sample.state as u8);
     row["limit_bits"] = json!(sample.limits);
+    if let Some(report) = verdict {
+        row["isolation"] = json!(IsolationRow::new(report, rate_hz));
+        row["isolation"]["verdict_code"] = json!(report.verdict);
+    }
     json!({ "timestamp": timestamp, "vsj": row })
 }
 
@@ -90,21 +95,26 @@ mod tests {
         let mut datagrams = Datagrams::to(&receiver.local_addr().unwrap().to_string(), 1000).unwrap();
         let sample =
             |tick| Telemetry { tick, state: State::Armed, applied: WireVolts(3 << 19), ..Telemetry::default() };
-        let mut received = |tick| -> Value {
-            datagrams.send(&sample(tick));
+        let named = IsolationReport { verdict: 0x302, size: 0.5, ..IsolationReport::default() };
+        let mut received = |tick, verdict: Option<IsolationReport>| -> Value {
+            datagrams.send(&sample(tick), verdict.as_ref());
             let mut bytes = [0; 2048];
             let count = receiver.recv(&mut bytes).unwrap();
             serde_json::from_slice(&bytes[..count]).unwrap()
         };
-        let first = received(5000);
-        let second = received(5250);
+        let first = received(5000, None);
+        let second = received(5250, Some(named));
         let after_s = second["timestamp"].as_f64().unwrap() - first["timestamp"].as_f64().unwrap();
         assert!((after_s - 0.25).abs() < 1e-6, "{after_s}");
         assert_eq!((&second["vsj"]["applied_v"], &second["vsj"]["state_code"]), (&json!(1.5), &json!(1)));
-        assert!(received(3)["timestamp"].as_f64() > first["timestamp"].as_f64(), "after a restart");
+        assert_eq!(first["vsj"].get("isolation"), None, "it has said nothing");
+        let said = &second["vsj"]["isolation"];
+        assert_eq!((&said["cause"], &said["verdict_code"]), (&json!("time-constant"), &json!(0x302)));
+        assert_eq!(said["size"]["value"], json!(0.5));
+        assert!(received(3, None)["timestamp"].as_f64() > first["timestamp"].as_f64(), "after a restart");
         drop(receiver);
         for tick in 10..20 {
-            datagrams.send(&sample(tick));
+            datagrams.send(&sample(tick), None);
         }
         assert_eq!(datagrams.sent + datagrams.not_sent, 13);
     }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
-use link::{Desired, Reason, Request, State, Status};
+use link::{Desired, IsolationReport, Reason, Request, State, Status};
 use simulation::schedule::{Reader, Schedule};
 
 use super::message::{Event, Order, Playing};
@@ -83,6 +83,8 @@ pub struct Worker<'a> {
     must_disarm: bool,
     /// False once the MCU's program has refused to report what the isolation bank says.
     knows_isolation: bool,
+    /// What the bank said last with the telemetry.
+    isolation: Option<IsolationReport>,
     /// False once it has refused to report what the adaptation does.
     knows_adaptation: bool,
     begin: Instant,
@@ -103,6 +105,7 @@ impl<'a> Worker<'a> {
             state: status.sample.state,
             must_disarm: false,
             knows_isolation: true,
+            isolation: None,
             knows_adaptation: true,
             begin: Instant::now(),
             outcome: Outcome::default(),
@@ -200,7 +203,8 @@ impl<'a> Worker<'a> {
         self.status = client.status()?;
         self.state = self.status.sample.state;
         self.say(Event::Status(self.status));
-        if self.knows_isolation {
+        // Most say it with the telemetry.
+        if self.knows_isolation && client.verdict().is_none() {
             let isolation = client.isolation(Isolation::Read)?;
             self.knows_isolation = isolation.is_some();
             isolation.into_iter().for_each(|report| self.say(Event::Isolation(report)));
@@ -215,6 +219,10 @@ impl<'a> Worker<'a> {
 
     fn collect(&mut self, client: &mut Client) -> Result<(), Failure> {
         let samples: Vec<_> = client.samples(COLLECT)?.collect();
+        if let Some(report) = client.verdict().filter(|report| Some(*report) != self.isolation) {
+            self.isolation = Some(report);
+            self.say(Event::Isolation(report));
+        }
         let Some(last) = samples.last() else { return Ok(()) };
         self.state = last.state;
         for sample in &samples {

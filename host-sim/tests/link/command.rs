@@ -266,6 +266,41 @@ fn a_recording_follows_a_schedule_and_is_a_record() {
 }
 
 #[test]
+fn a_recording_names_each_verdict_that_comes_with_the_telemetry() {
+    let folder = tempfile::tempdir().unwrap();
+    for says_verdict in [true, false] {
+        let mcu = Mcu::on_socket(Setup { says_verdict, ..Setup::default() });
+        let out = folder.path().join(format!("{says_verdict}.csv"));
+        let recording = start(&mcu.port, &["record", out.to_str().unwrap(), "--json"]);
+        let rows = || std::fs::read_to_string(&out).map_or(0, |text| text.lines().count());
+        let wait_for = |count| {
+            while rows() < count {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+        };
+        wait_for(20);
+        mcu.with(|shared| shared.isolation = IsolationReport { verdict: 0x302, size: 0.5, ..Default::default() });
+        wait_for(60);
+        assert!(Command::new("kill").args(["-INT", &recording.id().to_string()]).status().unwrap().success());
+        let recording = recording.wait_with_output().unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&stdout(&recording)).unwrap();
+        let verdicts: Vec<_> =
+            summary["isolation"].as_array().unwrap().iter().map(|said| said["verdict"].as_str().unwrap()).collect();
+        let remarks = String::from_utf8(recording.stderr).unwrap();
+        let named = format!("{}: isolation named time-constant, size 0.5000", mcu.port);
+        assert_eq!(
+            (verdicts.as_slice(), remarks.matches(&named).count()),
+            match says_verdict {
+                true => (&["quiet", "named"][..], 1),
+                false => (&[][..], 0),
+            },
+            "{remarks}"
+        );
+        assert!(!remarks.contains("quiet"), "{remarks}");
+    }
+}
+
+#[test]
 fn a_recording_that_is_killed_keeps_whole_rows() {
     let mcu = Mcu::on_socket(Setup::default());
     let folder = tempfile::tempdir().unwrap();

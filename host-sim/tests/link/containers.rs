@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
+use link::IsolationReport;
 use record_files::open;
 use serde_json::Value;
 use simulation::record::Format;
@@ -77,19 +78,23 @@ fn watch_sends_each_sample_as_a_datagram_and_goes_on_without_a_receiver() {
     let receiver = UdpSocket::bind("127.0.0.1:0").unwrap();
     receiver.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     let address = receiver.local_addr().unwrap().to_string();
+    let named = IsolationReport { verdict: 0x302, size: 0.5, ..IsolationReport::default() };
+    mcu.with(|shared| shared.isolation = named);
     let watch = ["watch", "--seconds", "1.5", "--udp", &address, "--rate-hz", "50", "--json"];
     let child = start(&mcu.port, &watch);
-    let mut times = Vec::new();
+    let (mut times, mut causes) = (Vec::new(), Vec::new());
     for _ in 0..30 {
         let mut bytes = [0; 2048];
         let count = receiver.recv(&mut bytes).unwrap();
         let sample: Value = serde_json::from_slice(&bytes[..count]).unwrap();
         assert!(sample["vsj"]["applied_v"].is_number() && sample["vsj"]["state"] == "disarmed", "{sample}");
+        causes.push(sample["vsj"]["isolation"]["cause"].clone());
         times.push(sample["timestamp"].as_f64().unwrap());
     }
     // The default rate would be 0.01 s from one to the next; on a busy machine samples may be lost.
     let mean_s = (times[29] - times[0]) / 29.0;
     assert!(mean_s > 0.018 && times.is_sorted(), "{times:?}");
+    assert!(causes[5..].iter().all(|cause| cause == "time-constant"), "{causes:?}");
     drop(receiver);
     let output = child.wait_with_output().unwrap();
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();

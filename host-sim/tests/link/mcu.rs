@@ -20,8 +20,8 @@ use link::isolation::{Isolation, Off};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    About, AdaptationReport, Block, Command, Controller, Fault, IsolationReport, Reply, Server, State, Step, Telemetry,
-    View,
+    About, AdaptationReport, Block, Command, Controller, Fault, IsolationReport, Notice, Reply, Server, State, Step,
+    Telemetry, View,
 };
 use model::adaptation::Phase;
 use model::stiffness::{Cantilever, YoungsModulus};
@@ -43,12 +43,22 @@ pub(crate) struct Setup {
     pub(crate) forgets: bool,
     /// Width of the converter.
     pub(crate) dac_bits: u32,
+    /// True if the verdict of the isolation bank comes with the telemetry.
+    pub(crate) says_verdict: bool,
 }
 
 impl Default for Setup {
     fn default() -> Self {
         // Longer than a busy machine needs to start one command after another.
-        Self { damage_one_in: None, sensor: false, hang_up_after: None, silence_ms: 5000, forgets: false, dac_bits: 12 }
+        Self {
+            damage_one_in: None,
+            sensor: false,
+            hang_up_after: None,
+            silence_ms: 5000,
+            forgets: false,
+            dac_bits: 12,
+            says_verdict: true,
+        }
     }
 }
 
@@ -69,6 +79,8 @@ pub(crate) struct Shared {
     pub(crate) counters: Counters,
     /// What the isolation bank says.
     pub(crate) isolation: IsolationReport,
+    /// Number of requests for it.
+    pub(crate) isolation_asked: u32,
     /// What the adaptation does.
     pub(crate) adaptation: AdaptationReport,
     /// True if the interlock is open.
@@ -223,6 +235,7 @@ impl Mcu {
                 }
                 chip.report_faults(&mut out);
                 out.extend_from_slice(chip.server.telemetry(&chip.view).unwrap_or_default());
+                chip.send_verdict(&mut out);
             }
         }));
     }
@@ -327,6 +340,14 @@ impl Chip {
         }
     }
 
+    /// Sends what the bank says with the telemetry, unless the MCU's program is from before that.
+    fn send_verdict(&mut self, out: &mut Vec<u8>) {
+        let report = IsolationReport { tick: self.view.sample.tick, ..self.shared.lock().unwrap().isolation };
+        if self.setup.says_verdict && self.server.verdict_due(report.verdict, &self.view) {
+            out.extend_from_slice(self.server.verdict(report.verdict, &Notice::Isolation(report), &self.view));
+        }
+    }
+
     fn hear(&mut self, byte: u8, out: &mut Vec<u8>) {
         match self.server.on_byte(byte, &self.view) {
             Some(Step::Command(command)) => {
@@ -350,6 +371,7 @@ impl Chip {
             }
             Some(Step::Isolation(request)) => {
                 let mut shared = self.shared.lock().unwrap();
+                shared.isolation_asked += 1;
                 if request == Isolation::Acknowledge {
                     shared.isolation = IsolationReport::default();
                 }

@@ -184,6 +184,26 @@ fn keys_arm_set_step_and_stop() {
     terminal.assert_restored();
 }
 
+/// An MCU from before the notices is asked for its verdict, twice per second.
+#[test]
+fn a_verdict_is_shown_as_it_comes_with_the_telemetry_or_asked_for() {
+    for says_verdict in [true, false] {
+        let mcu = Mcu::on_socket(Setup { says_verdict, ..Setup::default() });
+        let mut terminal = Terminal::watch(&[&mcu.port]);
+        terminal.wait_for(" DISARMED ");
+        terminal.wait_until("rates", |shown| shown.contains(" per s"));
+        mcu.with(|shared| (shared.isolation.verdict, shared.isolation_asked) = (0x302, 0));
+        terminal.wait_for("named time-constant");
+        mcu.with(|shared| shared.isolation.verdict = 0x100);
+        terminal.wait_for("alarm");
+        // Longer than from one request for the status to the next.
+        std::thread::sleep(Duration::from_millis(1100));
+        assert_eq!(mcu.with(|shared| shared.isolation_asked == 0), says_verdict);
+        terminal.press("q");
+        assert_eq!(terminal.end(), 0);
+    }
+}
+
 #[test]
 fn a_fault_is_shown_with_its_remedy_and_acknowledged() {
     let mcu = Mcu::on_socket(Setup::default());

@@ -10,7 +10,9 @@
 //!    [`Server::answered`] returns. [`Step::Restart`]: send the bytes and restart.
 //! 2. Whenever [`Server::take_heard`] is true, report to the control tick that the host was heard.
 //! 3. Before anything else is sent, and periodically, send what [`Server::fault`] returns until it returns `None`.
-//! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed.
+//! 4. Periodically send what [`Server::telemetry`] returns; [`Server::telemetry_lost`] if that does not succeed. An MCU with an
+//!    isolation bank also sends what [`Server::verdict`] returns whenever [`Server::verdict_due`]; [`Server::verdict_lost`] if that
+//!    does not succeed.
 //!
 //! A reply reports the result of the request because it is built from the view after the tick.
 
@@ -25,6 +27,7 @@ use crate::capture::Capture;
 use crate::command::Command;
 use crate::fault::Fault;
 use crate::isolation::Isolation;
+use crate::notice::Notice;
 use crate::reason::Reason;
 use crate::reply::{Firmware, Reply, Status};
 use crate::request::Request;
@@ -249,6 +252,22 @@ impl Server {
     /// Counts the last telemetry frame as dropped: the line did not take all of it.
     pub fn telemetry_lost(&mut self) {
         self.session.drop_telemetry(1);
+    }
+
+    /// True if the host receives telemetry and has to hear of the isolation bank's verdict with this code: with the first sample, when
+    /// it has changed, and once per second.
+    pub fn verdict_due(&self, verdict: u16, view: &View) -> bool {
+        self.session.verdict_due(verdict, view.sample.tick, self.about.rate_hz)
+    }
+
+    /// The frame of what the isolation bank says, whose verdict has this code.
+    pub fn verdict(&mut self, verdict: u16, notice: &Notice, view: &View) -> &[u8] {
+        self.session.verdict(verdict, notice, view.sample.tick)
+    }
+
+    /// The line did not take all of the last frame of [`Server::verdict`]: it is due again.
+    pub fn verdict_lost(&mut self) {
+        self.session.drop_verdict();
     }
 
     /// True once after each frame that ended the host's silence. A command carries this in [`Command::heard`] itself.

@@ -4,9 +4,10 @@ use super::*;
 use crate::adaptation::AdaptationReport;
 use crate::capture::Captured;
 use crate::diagnosis::{Mismatch, Sensor};
-use crate::frame::Frame;
+use crate::frame::{Frame, Unreadable};
 use crate::isolation::IsolationReport;
 use crate::nonce::Nonce;
+use crate::notice::Notice;
 use crate::receiver::Receiver;
 use crate::reply::FaultReport;
 use crate::sequence::Sequence;
@@ -45,6 +46,18 @@ fn stamped(bytes: &[u8]) -> (Nonce, Reply) {
     let mut receiver = Receiver::new();
     let read = |byte: &u8| receiver.on_byte(*byte).map(|packet| (packet.session(), packet.read().unwrap()));
     bytes.iter().find_map(read).unwrap()
+}
+
+/// Session and sequence number of a frame, and whether it is a reply.
+fn packet_of(bytes: &[u8]) -> (Nonce, Sequence, Result<Reply, Unreadable>) {
+    let mut receiver = Receiver::new();
+    let read = |byte: &u8| receiver.on_byte(*byte).map(|packet| (packet.session(), packet.sequence, packet.read()));
+    bytes.iter().find_map(read).unwrap()
+}
+
+fn notice_of(bytes: &[u8]) -> Result<Notice, Unreadable> {
+    let mut receiver = Receiver::new();
+    bytes.iter().find_map(|byte| receiver.on_byte(*byte).map(|packet| packet.read())).unwrap()
 }
 
 fn server() -> Server {
@@ -341,6 +354,49 @@ fn telemetry_that_is_not_sent_is_counted() {
     send(&mut server, &at(5003, DISARMED), nonce, 3, Request::Heartbeat);
     assert!(server.telemetry(&at(5013, DISARMED)).is_some());
     assert_eq!(server.counters().telemetry_dropped, 4);
+}
+
+/// A host from before it drops the frame by its kind; its sequence number is that of the sample before.
+#[test]
+fn the_verdict_comes_with_the_telemetry_when_it_changes_and_once_per_second() {
+    let mut server = server();
+    let nonce = greet(&mut server, &DISARMED);
+    assert!(!server.verdict_due(0x300, &at(9, DISARMED)), "no telemetry");
+    send(&mut server, &at(10, DISARMED), nonce, 1, Request::Stream { every_ticks: 10 });
+    let mut sent = std::vec::Vec::new();
+    let mut number = 2;
+    for tick in 11..4000 {
+        let verdict = if tick < 1500 { 0 } else { 0x300 };
+        let view = at(tick, DISARMED);
+        if tick % 300 == 0 && tick < 2800 {
+            send(&mut server, &view, nonce, number, Request::Heartbeat);
+            number += 1;
+        }
+        let sample = server.telemetry(&view).map(|bytes| packet_of(bytes).1);
+        if !server.verdict_due(verdict, &view) {
+            continue;
+        }
+        let notice = Notice::Isolation(IsolationReport { tick, verdict, ..IsolationReport::default() });
+        let bytes = server.verdict(verdict, &notice, &view);
+        let (session, sequence, read) = packet_of(bytes);
+        assert_eq!((session, read), (nonce, Err(Unreadable::Kind)), "no reply");
+        assert_eq!(notice_of(bytes), Ok(notice));
+        assert!(sample.is_none_or(|sample| sample == sequence));
+        sent.push(tick);
+        if tick == 1500 {
+            server.verdict_lost();
+        }
+    }
+    // 1500 was lost; the host has been silent since 2700 + 500.
+    assert_eq!(sent, [11, 1011, 1500, 1501, 2501]);
+    send(&mut server, &at(4000, DISARMED), nonce, number, Request::Stream { every_ticks: 0 });
+    assert!(!server.verdict_due(0x100, &at(4001, DISARMED)), "no telemetry any more");
+    send(&mut server, &at(4002, DISARMED), nonce, number + 1, Request::Stream { every_ticks: 5 });
+    assert!(server.verdict_due(0x300, &at(4002, DISARMED)), "with the first sample of a new request");
+    server.verdict(0x300, &Notice::Isolation(IsolationReport::default()), &at(4002, DISARMED));
+    assert!(!server.verdict_due(0x300, &at(4003, DISARMED)));
+    send(&mut server, &at(4004, DISARMED), nonce, number + 2, Request::Stream { every_ticks: 10 });
+    assert!(server.verdict_due(0x300, &at(4004, DISARMED)), "and of another, within the same second");
 }
 
 /// The monitors agree again once the output is off; the report still says what they found.

@@ -5,10 +5,12 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args;
+use host_sim::link::IsolationRow;
 use host_sim::output::recording::{Every, Recording};
 use host_sim::output::terminal::{print, remark};
 use indicatif::{ProgressBar, ProgressStyle};
 use link::Request;
+use model::isolation::Verdict;
 use serde_json::json;
 use simulation::bad_input;
 use simulation::schedule::Schedule;
@@ -72,7 +74,8 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
         session.order(Request::Arm)?;
     }
     session.order(Request::Stream { every_ticks: every.sample_ticks })?;
-    let done = follow(session, schedule.as_ref(), whole, &mut recording);
+    let mut verdicts = Vec::new();
+    let done = follow(session, schedule.as_ref(), whole, &mut recording, &mut verdicts);
     // The MCU would also stop by itself once the host is silent.
     let stopped = session.order(Request::Stream { every_ticks: 0 });
     let finished = recording.finish();
@@ -84,17 +87,20 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     if session.json {
         let mut report = serde_json::to_value(summary)?;
         report["file"] = json!(arguments.file);
+        report["isolation"] = json!(verdicts);
         print(&format!("{report}\n"))
     } else {
         print(&format!("wrote {file}: {} rows, {} s, {} samples lost\n", summary.rows, summary.seconds, summary.lost))
     }
 }
 
+/// Records, and collects what the isolation bank says first and at each change of its verdict.
 fn follow(
     session: &mut Session,
     schedule: Option<&Schedule>,
     whole: Option<Duration>,
     recording: &mut Recording,
+    verdicts: &mut Vec<IsolationRow>,
 ) -> Result<()> {
     let name = session.client.name().to_owned();
     let bar = match whole {
@@ -103,13 +109,23 @@ fn follow(
     };
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos} of {len} s, {msg}")?);
     let whole = whole.unwrap_or(Duration::MAX);
-    let mut drive = Drive::new(session, schedule);
+    let (mut drive, mut last) = (Drive::new(session, schedule), None);
     let start = drive.start;
     while start.elapsed() < whole && !stopped() {
         drive.step(session)?;
         let wait = Duration::from_millis(5).min(whole.saturating_sub(start.elapsed()));
         for sample in session.client.samples(wait).with_context(|| name.clone())? {
             recording.add(&sample)?;
+        }
+        let report = session.client.verdict();
+        let verdict = report.map(|report| report.verdict);
+        if let Some(report) = report.filter(|_| verdict != last) {
+            let row = IsolationRow::new(&report, session.status.rate_hz);
+            if last.is_some() || report.verdict().is_some_and(|says| says != Verdict::Quiet) {
+                bar.suspend(|| remark(&format!("{name}: isolation {}", row.text())));
+            }
+            verdicts.push(row);
+            last = verdict;
         }
         bar.set_position(start.elapsed().as_secs());
         bar.set_message(format!("{} rows", recording.summary().rows));

@@ -107,7 +107,9 @@ fn forward(session: &mut Session, datagrams: &mut Datagrams, time: Duration) -> 
     let until = Instant::now() + time;
     loop {
         let wait = until.saturating_duration_since(Instant::now()).min(Duration::from_millis(5));
-        session.client.samples(wait).with_context(|| name.clone())?.for_each(|sample| datagrams.send(&sample));
+        let samples: Vec<_> = session.client.samples(wait).with_context(|| name.clone())?.collect();
+        let verdict = session.client.verdict();
+        samples.iter().for_each(|sample| datagrams.send(sample, verdict.as_ref()));
         if Instant::now() >= until {
             return Ok(());
         }
