@@ -117,6 +117,7 @@ impl<P: Model> Validated<'_, Settings<P>> {
         let plant = self.part(&settings.plant);
         let step_v = settings.amplifier.slew_per_tick_v(sample_time);
         let resolution_v = settings.amplifier.volts_per_code();
+        let is_robust = matches!(settings.compensation, Compensation::Robust(_));
         let pre_compensator = match &settings.compensation {
             Compensation::None => PreCompensator::None,
             Compensation::ProportionalIntegral(gains) => {
@@ -132,7 +133,7 @@ impl<P: Model> Validated<'_, Settings<P>> {
             amplifier: self.part(&settings.amplifier).quantize(),
             estimator: P::quantize(plant),
             pre_compensator,
-            feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize()),
+            feedback: settings.feedback.as_ref().map(|feedback| self.part(feedback).quantize(is_robust)),
         }
     }
 

@@ -46,7 +46,7 @@ impl Validate for Feedback {
 }
 
 impl Validated<'_, Feedback> {
-    pub(crate) fn quantize(self) -> Config {
+    pub(crate) fn quantize(self, _: bool) -> Config {
         match *self.settings() {}
     }
 }

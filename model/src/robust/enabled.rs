@@ -6,11 +6,13 @@ use crate::error::OutOfRange;
 use crate::estimator::{Estimator, Invertible};
 use crate::feedback::{self, Observed};
 use crate::time_optimal::{self, Approach, TimeOptimal};
-use crate::units::{Accumulator, SampleTime, Signal, Volts};
+use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
 use crate::validated::{Validate, Validated};
 
 /// Part of a step that may be missing when it counts as done: 97 % are reached.
 const MISSING: f64 = 0.03;
+/// Largest change of the voltage in the direction of a step while the sensor is trusted, in V/s.
+const RISE_V_PER_S: f64 = 20e3;
 /// Largest relative error of a parameter.
 const LARGEST_ERROR: f64 = 0.25;
 
@@ -88,6 +90,8 @@ pub(crate) struct Robust<E: Estimator> {
     /// Overshoot that the quick spring may have where the sensor removes an error of the gain, and where it cannot.
     overshoot: Weight,
     overshoot_blind: Weight,
+    /// Largest change of the voltage in a tick in the direction of a step while the sensor is trusted, in V.
+    rise: Signal,
 }
 
 /// The quick spring and what the sensor has shown; the default is a spring at rest at 0 V.
@@ -116,6 +120,7 @@ impl Validated<'_, Margin> {
             part: Weight::new(2.0 * overshoot / (overshoot + MISSING)),
             overshoot: Weight::new(overshoot),
             overshoot_blind: Weight::new(((1.0 + overshoot) / (1.0 + gain) - 1.0).max(0.0)),
+            rise: signal(RISE_V_PER_S * self.sample_time().seconds()),
         }
     }
 }
@@ -151,7 +156,17 @@ impl<E: Estimator> Robust<E> {
         let excess = unseen.max(most.min(Signal::ZERO)).min(most.max(Signal::ZERO));
         let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess);
         let wanted = self.without_gain(state, wanted);
-        self.law.voltage(&mut state.law, Volts(wanted), &self.quick, &state.quick, aim.driven, aim.applied)
+        let voltage =
+            self.law.voltage(&mut state.law, Volts(wanted), &self.quick, &state.quick, aim.driven, aim.applied);
+        if blind {
+            return voltage;
+        }
+        let driven = aim.driven.0;
+        Volts(if state.step < Signal::ZERO {
+            voltage.0.max(driven.saturating_sub(self.rise))
+        } else {
+            voltage.0.min(driven.saturating_add(self.rise))
+        })
     }
 
     /// Holds `applied` across the quick spring for one sample time.

@@ -23,7 +23,9 @@
 //!   allowed, until they are there: with `part = 2 overshoot / (overshoot + 3 %)` the band of -3 % to the overshoot is used on both
 //!   sides. An error of the gain cannot be removed; it uses up the overshoot that is allowed.
 //! - **With a sensor** the correction `d` brings the model to the readings, as without this law. What has been seen needs no margin any
-//!   more: the margin lasts as long as the sensor takes to show an error, and not as long as the spring takes to settle. While the
+//!   more: the margin lasts as long as the sensor takes to show an error, and not as long as the spring takes to settle. The voltage
+//!   rises by at most 20 V in a millisecond (falls, in a step downward), so that a spring whose share is larger than the margin shows that
+//!   in the readings before it is above its target; the correction uses what shows a spring ahead of the model without delay. While the
 //!   sensor is not trusted, `seen` decays as the correction does, and `g` is 0 in the equations above.
 //!
 //! Reference: the least time of any controller without a sensor, by a linear programme (`vsj bound`). Without the feature `robust` the

@@ -17,6 +17,8 @@ use crate::markdown::table;
 
 /// Time in which a step has to reach 97 %, in s.
 pub const WITHIN_S: f64 = 0.6;
+/// Ticks at rest before the first step, in which the sensor is rated: more than the 50 readings that this takes.
+const REST_TICKS: usize = 100;
 /// Largest multiple of the shortest possible time, where that is longer.
 const OF_SHORTEST: f64 = 1.05;
 /// Largest overshoot, in percent of the step.
@@ -68,6 +70,7 @@ fn one(settings: &Settings, cause: Option<Cause>, seeds: Range<u64>) -> Result<O
         let mut shortest = Vec::new();
         let run = scenario.run_watched(
             settings,
+            REST_TICKS,
             |_, read| fresh(read),
             |tick, live| {
                 if tick % ticks == 0 {

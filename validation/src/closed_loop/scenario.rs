@@ -59,16 +59,18 @@ impl Scenario {
         settings: &Settings,
         sense: impl FnMut(usize, f64) -> Option<Reading>,
     ) -> Result<Vec<Sample>, OutOfRange> {
-        self.run_watched(settings, sense, |_, _| ())
+        self.run_watched(settings, 0, sense, |_, _| ())
     }
 
-    /// Does what [`Scenario::run`] does, and calls `before` with the spring before each tick.
+    /// Does what [`Scenario::run`] does after this number of ticks at rest, in which the sensor is rated as it is on the MCU before its
+    /// output is enabled; calls `before` with the spring before each tick of the stair.
     ///
     /// # Errors
     /// The model rejects the settings.
     pub fn run_watched(
         &self,
         settings: &Settings,
+        rest_ticks: usize,
         mut sense: impl FnMut(usize, f64) -> Option<Reading>,
         mut before: impl FnMut(usize, &Live),
     ) -> Result<Vec<Sample>, OutOfRange> {
@@ -76,6 +78,13 @@ impl Scenario {
         let mut state = State::default();
         let ticks = (stair::duration_s() * settings.rate_hz).round() as usize;
         let mut live = Live::new(&self.effects, self.noise, self.seed, 500.0, ticks);
+        // The stair then begins with the same noise.
+        let mut resting = live.clone();
+        for _ in 0..rest_ticks {
+            let measured = sense(0, resting.read().read);
+            config.rest(&mut state, measured);
+            resting.pass(1.0 / settings.rate_hz);
+        }
         let tick = |k: usize| {
             before(k, &live);
             let target = Volts::new(stair::target_v(k as f64 / settings.rate_hz))?;

@@ -17,6 +17,18 @@
 //! ```text
 //! -(6 noise_v + upper - y) <= nu <= 6 noise_v + y - lower      (lower, upper: the model's envelope, y: the model)
 //! ```
+//!
+//! The robust pre-compensator raises its voltage step by step, so that readings show the error of the model before the target is
+//! reached. With it ([`Config::is_quick`]) they are used without the delay of the gain `L`:
+//!
+//! - Two innovations in a row that are ahead by more than `1.5 noise_v` while the model moves are no noise, and no single wrong reading:
+//!   three quarters of the smaller one are added to the correction with the second. So are three quarters of the mean of the last
+//!   innovations, each clipped to `3 noise_v`, if that exceeds `0.75 noise_v`: twice its own standard deviation, and what a single wrong
+//!   reading gives it at most.
+//! - A correction for a spring that was **behind** is taken back in the same way, at most to 0 V, once the spring has caught up. A spring
+//!   that is late, because of a lag, a slow amplifier or a smaller share, would otherwise be driven beyond its target by what its delay
+//!   has added. A correction that goes to 0 V excites nothing: the loop is that of the model alone then.
+//! - For an innovation that takes a correction back, the bound is wider by that correction.
 
 use super::envelope::{self, Envelope};
 use crate::units::Signal;
@@ -26,29 +38,66 @@ use crate::units::Signal;
 pub(super) struct Config {
     envelope: envelope::Config,
     noise: Signal,
+    /// True if innovations that are ahead are used without delay.
+    is_quick: bool,
 }
 
-/// Envelope of the innovations.
+/// Envelope of the innovations, the last one, and the mean of the last ones, of which each has a quarter of the weight of all before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct State(Envelope);
+pub(super) struct State {
+    innovations: Envelope,
+    last: Signal,
+    mean: Signal,
+}
+
+/// What an innovation adds to the correction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Influence {
+    /// The clipped innovation, of which the gain adds a part, in V.
+    pub(super) clipped: Signal,
+    /// Part of the innovation that is added without delay, in V.
+    pub(super) quick: Signal,
+}
 
 impl Config {
     /// Quantizes the bounds; `noise` is the bound at rest, in V.
-    pub(super) fn new(interval_s: f64, noise: Signal) -> Self {
-        Self { envelope: envelope::Config::new(interval_s), noise }
+    pub(super) fn new(interval_s: f64, noise: Signal, is_quick: bool) -> Self {
+        Self { envelope: envelope::Config::new(interval_s), noise, is_quick }
     }
 
-    /// Returns the clipped innovation, in V, for a model that is at `model` and has the envelope `recent`.
+    /// Returns what an innovation adds to the correction, for a model that is at `model` and has the envelope `recent`; all in V.
     #[inline]
-    pub(super) fn clip(&self, state: &mut State, innovation: Signal, model: Signal, recent: &Envelope) -> Signal {
-        self.envelope.track(&mut state.0, innovation);
-        let (was_negative, was_positive) = state.0.distances(Signal::ZERO);
+    pub(super) fn of(
+        &self,
+        state: &mut State,
+        innovation: Signal,
+        correction: Signal,
+        model: Signal,
+        recent: &Envelope,
+    ) -> Influence {
+        self.envelope.track(&mut state.innovations, innovation);
+        let last = core::mem::replace(&mut state.last, innovation);
+        let (was_negative, was_positive) = state.innovations.distances(Signal::ZERO);
         let (risen, fallen) = recent.distances(model);
-        let bound = |moved, opposite| {
-            let ahead = if opposite > self.noise { Signal::ZERO } else { moved };
-            self.noise.saturating_add(ahead)
-        };
-        innovation.max(-bound(fallen, was_positive)).min(bound(risen, was_negative))
+        // Upward: an innovation above 0 V; otherwise all signs are those of the mirrored signals.
+        let up = innovation >= Signal::ZERO;
+        let mirrored = |signal: Signal| if up { signal } else { signal.saturating_neg() };
+        let (moved, behind) = if up { (risen, was_negative) } else { (fallen, was_positive) };
+        let ahead = if behind > self.noise { Signal::ZERO } else { moved };
+        let size = mirrored(innovation);
+        if !self.is_quick {
+            return Influence { clipped: mirrored(size.min(self.noise.saturating_add(ahead))), quick: Signal::ZERO };
+        }
+        let back = mirrored(correction).saturating_neg().max(Signal::ZERO);
+        let bound = self.noise.saturating_add(ahead).saturating_add(back);
+        let bounded = mirrored(size.min(self.noise >> 1));
+        state.mean = state.mean.saturating_add(bounded.saturating_sub(state.mean) >> 2);
+        let (twice, mean) = (size.min(mirrored(last)), mirrored(state.mean));
+        let shown = if twice > self.noise >> 2 { twice } else { mean };
+        let used = shown.min(ahead.max(back.min(moved)));
+        let quick = if moved > self.noise && used > self.noise >> 3 { used - (used >> 2) } else { Signal::ZERO };
+        state.mean = mirrored(mean.saturating_sub(quick).max(mean.min(Signal::ZERO)));
+        Influence { clipped: mirrored(size.min(bound)), quick: mirrored(quick) }
     }
 }
 
@@ -58,13 +107,29 @@ mod tests {
 
     const NOISE: f64 = 6.0;
 
-    /// Clips these innovations while the model has moved from 0 to 100 V; rounded to 1 V.
-    fn clipped<const N: usize>(innovations: [f64; N]) -> [f64; N] {
-        let config = Config::new(1e-3, Signal::from_num(NOISE));
+    /// What each of these innovations adds to a correction in V, clipped and without delay, while the model has moved from 0 V to there.
+    fn after<const N: usize>(moved: f64, is_quick: bool, correction: f64, innovations: [f64; N]) -> [(f64, f64); N] {
+        let config = Config::new(1e-3, Signal::from_num(NOISE), is_quick);
         let (mut state, mut recent) = (State::default(), Envelope::default());
-        let model = Signal::from_num(100);
+        let (model, correction) = (Signal::from_num(moved), Signal::from_num(correction));
         envelope::Config::new(1e-3).track(&mut recent, model);
-        innovations.map(|nu| config.clip(&mut state, Signal::from_num(nu), model, &recent).to_num::<f64>().round())
+        innovations.map(|nu| {
+            let Influence { clipped, quick } = config.of(&mut state, Signal::from_num(nu), correction, model, &recent);
+            (clipped.to_num::<f64>().round(), quick.to_num())
+        })
+    }
+
+    /// The same while the model has moved by 100 V.
+    fn of<const N: usize>(is_quick: bool, correction: f64, innovations: [f64; N]) -> [(f64, f64); N] {
+        after(100.0, is_quick, correction, innovations)
+    }
+
+    /// The clipped innovations; rounded to 1 V.
+    fn clipped<const N: usize>(innovations: [f64; N]) -> [f64; N] {
+        of(false, 0.0, innovations).map(|(clipped, quick)| {
+            assert_eq!(quick, 0.0);
+            clipped
+        })
     }
 
     #[test]
@@ -75,5 +140,27 @@ mod tests {
         assert_eq!(clipped([-50.0, 50.0]), [-NOISE, NOISE]);
         // A deviation behind within the noise does not count as behind.
         assert_eq!(clipped([-5.0, 50.0]), [-5.0, 50.0]);
+    }
+
+    #[test]
+    fn two_innovations_ahead_are_used_without_delay_and_one_is_not() {
+        let quick = |innovations| of(true, 0.0, innovations).map(|(_, quick)| quick);
+        // Three quarters of the smaller one.
+        assert_eq!(quick([20.0, 16.0, -1.0, 16.0]), [0.0, 12.0, 0.0, 0.0]);
+        // Their mean exceeds 0.75 V with the fourth.
+        assert_eq!(quick([1.25, 1.25, 1.25, 1.25]), [0.0, 0.0, 0.0, 0.75 * 1.25 * (1.0 - 0.75f64.powi(4))]);
+        assert_eq!(quick([-5.0, -5.0, -5.0, -5.0]), [0.0; 4], "behind");
+        assert_eq!(quick([-20.0, 8.0, 8.0, 8.0]), [0.0; 4], "behind recently");
+        let quick_after = |moved| after(moved, true, 0.0, [20.0, 20.0])[1].1;
+        assert_eq!(quick_after(NOISE - 1.0), 0.0, "the model moves by less than the noise");
+        let quick = quick_after(NOISE + 2.0);
+        assert!((5.9..6.0).contains(&quick), "three quarters of what it has moved by, not {quick} V");
+    }
+
+    #[test]
+    fn a_correction_for_a_spring_that_was_behind_is_taken_back_without_delay_but_not_beyond_0() {
+        assert_eq!(of(true, -4.0, [-20.0, 8.0, 8.0]), [(-6.0, 0.0), (8.0, 0.0), (8.0, 3.0)]);
+        assert_eq!(of(true, -40.0, [-20.0, 60.0, 60.0]), [(-6.0, 0.0), (46.0, 0.0), (46.0, 30.0)]);
+        assert_eq!(of(false, -40.0, [-20.0, 60.0, 60.0]), [(-6.0, 0.0), (6.0, 0.0), (6.0, 0.0)]);
     }
 }

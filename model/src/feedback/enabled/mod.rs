@@ -13,6 +13,7 @@ mod settings;
 pub use fault_detection::{Fault, Sensor};
 pub use settings::{Feedback, HISTORY, Reading};
 
+use self::influence::Influence;
 use super::Observed;
 use crate::coefficient::{Rate, upper, widened};
 use crate::units::{Accumulator, ScaledStiffness, Signal, Volts};
@@ -41,14 +42,14 @@ pub struct State {
 }
 
 impl Validated<'_, Feedback> {
-    /// Quantizes the correction for the tick.
-    pub(crate) fn quantize(self) -> Config {
+    /// Quantizes the correction for the tick. `is_quick`: readings that show a spring ahead of its model are used without delay.
+    pub(crate) fn quantize(self, is_quick: bool) -> Config {
         let (feedback, sample_time) = (self.settings(), self.sample_time());
         let detection = fault_detection::Config::new(feedback, sample_time);
         Config {
             gain: Rate::new(feedback.gain()),
             fade: Rate::new(sample_time.lag_fraction(feedback.fade_s)),
-            influence: influence::Config::new(feedback.interval_s, detection.noise()),
+            influence: influence::Config::new(feedback.interval_s, detection.noise(), is_quick),
             detection,
             oscillation: oscillation::Config::new(feedback.interval_s, sample_time),
         }
@@ -73,8 +74,11 @@ impl Config {
                 self.oscillation.detect(&mut state.oscillation, mismatch, self.detection.noise());
                 let (innovation, model) = (mismatch.saturating_sub(correction), state.model_at(0));
                 let recent = state.detection.model_envelope();
-                let clipped = self.influence.clip(&mut state.influence, innovation, model, recent);
-                (state.oscillation.reduce(self.gain.step(clipped)), Observed::Reading)
+                let Influence { clipped, quick } =
+                    self.influence.of(&mut state.influence, innovation, correction, model, recent);
+                let step = self.gain.step(clipped).saturating_add(widened(quick));
+                let observed = if quick == Signal::ZERO { Observed::Reading } else { Observed::Ahead };
+                (state.oscillation.reduce(step), observed)
             }
             (Sensor::Trusted, None) => (Accumulator::ZERO, Observed::Nothing),
             _ => (self.fade.step(Signal::ZERO.saturating_sub(correction)), Observed::Untrusted),
@@ -83,14 +87,16 @@ impl Config {
         (state.corrected(target), observed)
     }
 
-    /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, and back to 0 V while the sensor
-    /// is not trusted.
+    /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, without delay at one that shows the
+    /// spring ahead, and back to 0 V while the sensor is not trusted.
     #[inline]
     #[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
     pub(crate) fn follow(&self, observed: Observed, seen: &mut Accumulator, signal: Signal) {
         let distance = |to: Signal| to.saturating_sub(upper(*seen));
         let step = match observed {
             Observed::Reading => self.gain.step(distance(signal)),
+            // As much of it as the correction has taken of the innovation.
+            Observed::Ahead => widened(distance(signal)) - (widened(distance(signal)) >> 2),
             Observed::Nothing => Accumulator::ZERO,
             Observed::Untrusted => self.fade.step(distance(Signal::ZERO)),
         };
@@ -148,5 +154,27 @@ impl State {
         // The length of the ring divides 256: the index may wrap.
         let index = usize::from(self.newest.wrapping_sub(age as u8)) % HISTORY;
         self.model.get(index).copied().unwrap_or(Signal::ZERO)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::SampleTime;
+    use crate::validated::Validate;
+
+    /// Otherwise the margin would be kept for what the correction has taken.
+    #[test]
+    fn what_is_seen_follows_as_much_as_the_correction_has_taken() {
+        let feedback = Feedback::TYPICAL;
+        let config = feedback.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize(true);
+        let seen = |observed| {
+            let mut seen = widened(Signal::from_num(20));
+            config.follow(observed, &mut seen, Signal::from_num(100));
+            upper(seen).to_num::<f64>()
+        };
+        assert_eq!((seen(Observed::Nothing), seen(Observed::Ahead)), (20.0, 80.0));
+        assert!((seen(Observed::Reading) - (20.0 + 80.0 * feedback.gain())).abs() < 1e-3);
+        assert!((19.0..20.0).contains(&seen(Observed::Untrusted)));
     }
 }
