@@ -1,7 +1,7 @@
 //! The answer of `vsj bound` as text.
 
 use crate::output::cells::{line, optional, tidy};
-use simulation::robust_bound::{Answer, Needed};
+use simulation::robust_bound::{Answer, Needed, OF_KNOWN};
 use simulation::spring_error::{Parameter, SpringError};
 
 /// The shortest times of all steps, and how well the spring has to be known.
@@ -16,19 +16,26 @@ pub fn text(answer: &Answer) -> String {
             tidy(answer.overshoot_percent)
         ),
     );
-    line(&mut text, "    step [V] | spring known [s] | known to the errors [s]");
+    line(&mut text, "    step [V] | spring known [s] | known to the errors [s] | nominal first [s]");
     for step in &answer.steps {
         line(
             &mut text,
             &format!(
-                "{:>4} -> {:<4} | {:>16} | {:>23}",
+                "{:>4} -> {:<4} | {:>16} | {:>23} | {:>17}",
                 tidy(step.from_v),
                 tidy(step.to_v),
                 optional(step.known_s, 3),
-                optional(step.t97_s, 3)
+                optional(step.t97_s, 3),
+                optional(step.nominal_first_s, 3)
             ),
         );
     }
+    line(
+        &mut text,
+        &format!(
+            "Nominal first: the spring without errors stays above 97 % from {OF_KNOWN} times its own shortest time on."
+        ),
+    );
     line(&mut text, &format!("Errors: {}", errors(&answer.spring_error)));
     text.push('\n');
     text + &needed(&answer.needed, answer.within_s)

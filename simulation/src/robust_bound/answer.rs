@@ -10,6 +10,9 @@ use crate::plant_file::PlantFile;
 use crate::schedule::Schedule;
 use crate::spring_error::{Parameter, SpringError};
 
+/// Multiple of its own shortest time in which the nominal spring is at 97 % for [`Step::nominal_first_s`].
+pub const OF_KNOWN: f64 = 1.05;
+
 /// What is asked of [`answer`].
 #[derive(Clone, Copy, Debug)]
 pub struct Question {
@@ -51,6 +54,9 @@ pub struct Step {
     pub known_s: Option<f64>,
     /// Shortest t97 for all springs within the errors, in s; `None` if out of reach.
     pub t97_s: Option<f64>,
+    /// Shortest t97 for all springs within the errors, in s, if the nominal one stays above 97 % from [`OF_KNOWN`] times `known_s` on;
+    /// `None` if out of reach.
+    pub nominal_first_s: Option<f64>,
 }
 
 /// Largest relative errors, both ways; `None` if the time is too short even without errors.
@@ -89,12 +95,14 @@ pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
     let bound = RobustBound::new(file, allowed)?;
     let of = |&(from_v, to_v): &(f64, f64)| {
         let known_s = bound.shortest_s(from_v, to_v, &SpringError::default());
-        let t97_s = if spring_error == SpringError::default() {
-            known_s
+        let (t97_s, nominal_first_s) = if spring_error == SpringError::default() {
+            (known_s, known_s)
         } else {
-            bound.shortest_s(from_v, to_v, &spring_error)
+            let nominal_s = known_s.map(|known_s| OF_KNOWN * known_s);
+            let first = |nominal_s| bound.shortest_with_nominal_s(from_v, to_v, &spring_error, nominal_s);
+            (bound.shortest_s(from_v, to_v, &spring_error), nominal_s.and_then(first))
         };
-        Step { from_v, to_v, known_s, t97_s }
+        Step { from_v, to_v, known_s, t97_s, nominal_first_s }
     };
     Ok(Answer {
         limit_v: allowed.amplifier.max_v,
