@@ -75,7 +75,9 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
             {
                 server.telemetry_lost();
             }
-            if !send_verdict(line, server, &view).await {
+            if let Some(bytes) = verdict(server, &view)
+                && !send(line, bytes).await
+            {
                 server.verdict_lost();
             }
         }
@@ -89,15 +91,12 @@ async fn report_faults(line: &mut impl Line, server: &mut Server, view: &View) {
     }
 }
 
-/// Sends what the isolation bank says with the telemetry, if it is due. False after a timeout.
-async fn send_verdict(line: &mut impl Line, server: &mut Server, view: &View) -> bool {
-    let Some((verdict, notice)) = isolation::notice(view.sample.tick, |verdict| server.verdict_due(verdict, view))
-    else {
-        return true;
-    };
-    // The notice is not kept while the frame is sent.
-    let bytes = server.verdict(verdict, &notice, view);
-    send(line, bytes).await
+/// Returns the frame of what the isolation bank says with the telemetry, if it is due.
+// Not a part of the task, which would keep the notice in RAM while the frame is sent.
+#[inline(never)]
+fn verdict<'a>(server: &'a mut Server, view: &View) -> Option<&'a [u8]> {
+    let (verdict, notice) = isolation::notice(view.sample.tick, |verdict| server.verdict_due(verdict, view))?;
+    Some(server.verdict(verdict, &notice, view))
 }
 
 /// Sends a frame. False after a timeout: the frame is incomplete then, and the host drops it.

@@ -47,19 +47,15 @@ pub async fn execute(request: Request, tick: u64) -> Reply {
             Timer::after(Duration::from_millis(1)).await;
         }
     }
-    Reply::Isolation(latest(tick))
+    let (report, since_tick) = LATEST.lock(Cell::get).unwrap_or_default();
+    Reply::Isolation(describe(&report, tick, since_tick))
 }
 
 /// Returns what to send with the telemetry at `tick` and the code of its verdict, if it `is_due` with this code.
 pub fn notice(tick: u64, is_due: impl FnOnce(u16) -> bool) -> Option<(u16, Notice)> {
-    let verdict = LATEST.lock(Cell::get).map_or(0, |(report, _)| report.verdict.code());
-    is_due(verdict).then(|| (verdict, Notice::Isolation(latest(tick))))
-}
-
-/// Returns the latest report in SI units.
-fn latest(tick: u64) -> IsolationReport {
     let (report, since_tick) = LATEST.lock(Cell::get).unwrap_or_default();
-    describe(&report, tick, since_tick)
+    let verdict = report.verdict.code();
+    is_due(verdict).then(|| (verdict, Notice::Isolation(describe(&report, tick, since_tick))))
 }
 
 /// Returns a report in SI units.
