@@ -715,9 +715,10 @@ private:
     /// Asks for a new session, which the next request begins.
     void begin() {
         session_ = 0;
-        isolation_.reset();
         status_ = read_status(exchange({0}));
         requests_ = 0;
+        // One that came before the answer belongs to the session before.
+        isolation_.reset();
     }
 
     /// A request of the session, after what it needs.

@@ -136,9 +136,10 @@ impl Client {
 
     /// Asks for a new session; the next request begins it.
     pub(crate) fn begin(&mut self) -> Result<(), Failure> {
-        (self.session, self.verdict) = (Nonce::NONE, None);
+        self.session = Nonce::NONE;
         status(self.exchange(Request::Hello)?)?;
-        self.requests = 0;
+        // One that came before the answer belongs to the session before.
+        (self.requests, self.verdict) = (0, None);
         Ok(())
     }
 
@@ -323,6 +324,8 @@ mod tests {
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.order(Request::Stream { every_ticks: 0 }).unwrap();
         assert_eq!(client.verdict().map(|report| report.verdict), Some(VERDICT));
+        // Its verdict is on the way while another session is asked for.
+        client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.begin().unwrap();
         assert_eq!(client.verdict(), None);
         drop(client);
