@@ -62,6 +62,12 @@ impl Terminal {
         self.keys.write_all(keys.as_bytes()).unwrap();
     }
 
+    /// Changes the size of the screen, and then that of the terminal: what the program draws for it must find that screen.
+    fn resize(&mut self, rows: u16, columns: u16) {
+        self.screen.lock().unwrap().screen_mut().set_size(rows, columns);
+        self.master.resize(size(rows, columns)).unwrap();
+    }
+
     /// Waits until the screen contains `text`.
     fn wait_for(&self, text: &str) -> String {
         self.wait_until(text, |shown| shown.contains(text))
@@ -285,11 +291,9 @@ fn another_size_of_the_terminal_is_drawn_anew() {
     let mcu = Mcu::on_socket(Setup::default());
     let mut terminal = Terminal::watch(&[&mcu.port]);
     terminal.wait_for("Applied voltage [V]");
-    terminal.master.resize(size(12, 40)).unwrap();
-    terminal.screen.lock().unwrap().screen_mut().set_size(12, 40);
+    terminal.resize(12, 40);
     terminal.wait_until("a smaller screen", |shown| !shown.contains("Applied voltage") && shown.contains("space STOP"));
-    terminal.master.resize(size(40, 120)).unwrap();
-    terminal.screen.lock().unwrap().screen_mut().set_size(40, 120);
+    terminal.resize(40, 120);
     terminal.wait_for("Applied voltage [V]");
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
