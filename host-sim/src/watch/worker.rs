@@ -203,7 +203,7 @@ impl<'a> Worker<'a> {
         self.status = client.status()?;
         self.state = self.status.sample.state;
         self.say(Event::Status(self.status));
-        // Most say it with the telemetry.
+        // An MCU that sends it with the telemetry need not be asked.
         if self.knows_isolation && client.verdict().is_none() {
             let isolation = client.isolation(Isolation::Read)?;
             self.knows_isolation = isolation.is_some();
