@@ -26,6 +26,8 @@ pub struct Options {
     /// True if the simulation was identified from the record that is diagnosed: gain, zero and relaxation are then estimated anew with
     /// every set of causes, as causes that a linear model lacks bias them.
     pub identified: bool,
+    /// True if these readings also show a decay that the voltage does not drive, see [`Identified::decays`].
+    pub decays: bool,
     /// An identified spring of lower order that is diagnosed as well: a model of higher order imitates what is not linear.
     pub simpler: Option<Base>,
     /// Root mean square error of the identified spring on held-out segments, in the reading's unit; `None` if it was not identified.
@@ -52,10 +54,10 @@ impl Options {
     /// # Errors
     /// Those of [`Base::new`].
     pub fn judging(self, identified: Identified) -> Result<Self> {
-        let Identified { report, plant, simpler, settled, linear, .. } = identified;
+        let Identified { report, plant, simpler, settled, decays, linear, .. } = identified;
         let held_out_rmse = Some(report.held_out_rmse);
         let simpler = simpler.map(Base::new).transpose()?;
-        Self { unsettled: !settled, identified: true, simpler, held_out_rmse, linear, ..self }
+        Self { unsettled: !settled, identified: true, decays, simpler, held_out_rmse, linear, ..self }
             .judging_file("identify", plant)
     }
 
@@ -87,6 +89,7 @@ impl Default for Options {
             base: Base::paper(),
             unsettled: false,
             identified: false,
+            decays: false,
             simpler: None,
             held_out_rmse: None,
             effort: Effort::Normal,

@@ -156,7 +156,7 @@ fn under(
 ) -> Result<Normalised> {
     let mut normalisations = Normalisation::of_each(records, base.file(), options.input, &options.units);
     for of in &mut normalisations {
-        (of.unsettled, of.identified) = (options.unsettled, options.identified);
+        (of.unsettled, of.identified, of.decays) = (options.unsettled, options.identified, options.decays);
     }
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let nominal = nominal(&options.plant, base);
@@ -333,6 +333,10 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
         finding.rmse_before = finding.rmse_before.min(report.baseline.rmse).max(finding.rmse_after);
     }
     credibility::with_unknown_laws(&mut report.findings);
+    if let Some(alone) = credibility::likely_alone(&report.findings).filter(|_| report.verdict == Verdict::Explained) {
+        report.verdict = Verdict::Ambiguous;
+        report.alternatives.push(alone);
+    }
     diagnosis::without_the_unearned(report, &without.extended);
     without.baseline = with.baseline;
     let [before, _] = with.held_out;

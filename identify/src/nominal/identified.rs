@@ -5,7 +5,7 @@ use simulation::record::Record;
 use simulation::units::Units;
 
 use crate::answer::SCHEMA;
-use crate::linear::Series;
+use crate::linear::{Section, Series};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::intervals::{deviations, directions, not_negative, positive, whole_rows};
@@ -28,6 +28,9 @@ pub struct Identified {
     pub simpler: Option<PlantFile>,
     /// True if the spring was taken to be at rest when each record begins.
     pub settled: bool,
+    /// True if the readings also show a decay that the voltage does not drive: a drift, or what an earlier voltage left behind in a slow
+    /// part of the spring.
+    pub decays: bool,
     /// The best linear model of the records, which may be of another order or law of the input; `None` if readings were left out.
     pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
@@ -144,5 +147,6 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     };
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
     let settled = problem.series.iter().all(Series::is_at_rest);
-    Identified { report, plant, simpler: None, settled, linear: None, records }
+    let decays = fit.poles.undriven.iter().any(|place| matches!(fit.poles.sections[*place], Section::First { .. }));
+    Identified { report, plant, simpler: None, settled, decays, linear: None, records }
 }

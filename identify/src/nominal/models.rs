@@ -1,11 +1,9 @@
 //! The best linear model of each order, and which of them is the nominal one: the smallest that no larger one beats.
 
-use std::f64::consts::TAU;
-
 use simulation::record::Record;
 
 use crate::answer::LinearError;
-use crate::linear::{Fit, Poles, Problem, Section, Series, best_of_each_order, held_out_residual};
+use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::InputLaw;
 use crate::nominal::usable::check;
@@ -14,7 +12,6 @@ use crate::stats::median::robust_deviation;
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::segments::excess;
 use crate::stats::sums::dot;
-use crate::stats::thresholds::empirical::FEWEST_PERIODS;
 use crate::stats::thresholds::probability::{RIVAL_ODDS, Z, Z_DOUBTFUL, Z_WORSE};
 
 /// A larger model is preferred if its held-out error is smaller by this part, ...
@@ -179,13 +176,8 @@ fn without_undriven(problem: &Problem, fit: &Fit) -> Option<Fit> {
     let sections = fit.poles.sections.iter().flat_map(|section| section.apart()).collect();
     let refined = |poles: Poles| problem.refined(poles, steps(problem), REFIT.1);
     let poles = Poles { sections, ..fit.poles.clone() };
-    let is_hum = |section: Section| match section {
-        Section::Second { frequency, .. } => {
-            problem.never_decays(section) && frequency * problem.bounds.decay > TAU * FEWEST_PERIODS.get()
-        }
-        Section::First { .. } => false,
-    };
-    let lasting: Vec<usize> = poles.driven().filter(|(_, section)| is_hum(*section)).map(|(place, _)| place).collect();
+    let lasting: Vec<usize> =
+        poles.driven().filter(|(_, section)| problem.never_decays(*section)).map(|(place, _)| place).collect();
     let mut found = (!lasting.is_empty()).then(|| refined(Poles { undriven: lasting, ..poles.clone() }));
     loop {
         let (poles, cost) = found.as_ref().map_or((&poles, fit.cost), |found| (&found.poles, found.cost));

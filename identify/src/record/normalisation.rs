@@ -62,6 +62,8 @@ pub struct Normalisation {
     /// True if the nominal spring was identified from the same readings: its gain and zero are estimated anew for every model, as
     /// causes that it lacks have biased them.
     pub identified: bool,
+    /// True if the readings also show a decay that the voltage does not drive: a drift, or what an earlier voltage left behind.
+    pub decays: bool,
 }
 
 impl Default for Normalisation {
@@ -74,6 +76,7 @@ impl Default for Normalisation {
             start: None,
             unsettled: false,
             identified: false,
+            decays: false,
         }
     }
 }
@@ -128,6 +131,7 @@ impl Normalisation {
             start,
             unsettled: false,
             identified: false,
+            decays: false,
         }
     }
 

@@ -34,6 +34,9 @@ const LIKELY_TOGETHER: f64 = 0.8;
 /// Causes that do not respond to the voltage, so that they correct no law.
 const APART: [&str; 2] = ["hum", "outliers"];
 
+/// Causes that a drift, or what an earlier voltage left behind, may be taken for.
+const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series-lag"];
+
 /// Lowers probabilities by the chance that a law which no cause describes is behind a finding.
 pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
@@ -63,6 +66,12 @@ pub(crate) fn in_unexplained(findings: &mut [Finding], structure: f64) {
         let factor = IF_UNEXPLAINED.get() * part(explained(finding).max(0.0), structure.max(0.0));
         lower(finding, factor);
     }
+}
+
+/// Lowers probabilities of the slow causes where the readings decay without being driven: each may stand for another.
+pub(crate) fn of_slow(findings: &mut [Finding]) {
+    let slow = findings.iter_mut().filter(|finding| SLOW.contains(&finding.cause));
+    slow.for_each(|finding| lower(finding, IF_UNEXPLAINED.get()));
 }
 
 /// Lowers probabilities of causes that spoil an extrapolation.

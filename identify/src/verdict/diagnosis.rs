@@ -118,6 +118,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let mut findings = findings(engine, &found);
     credibility::with_unknown_laws(&mut findings);
+    if data.normalisation.decays {
+        credibility::of_slow(&mut findings);
+    }
     let unearned = is_unearned(&findings, extended);
     let unexplained = structured || !spoiling.is_empty() || unfinished || unearned;
     credibility::of_spoiling(&mut findings, &spoiling);
