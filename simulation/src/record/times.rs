@@ -76,7 +76,7 @@ impl Clock {
                     stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
                     self.last = stamp.nanoseconds;
                 }
-                let since_first = (stamp.nanoseconds - first.nanoseconds) as f64 * 1e-9;
+                let since_first = stamp.since(first);
                 Ok(Time { value: since_first, since_first })
             }
             (First::Stamp(Stamp { form, .. }), _) => {
@@ -164,6 +164,11 @@ impl Stamp {
             Some(stamp(time.timestamp(), time.timestamp_subsec_nanos(), Form::WithZone))
         })
     }
+
+    /// Time since another stamp of the same form, in s: the double next to the decimal number, which a product with 1e-9 is not.
+    fn since(self, first: Self) -> f64 {
+        (self.nanoseconds - first.nanoseconds) as f64 / 1e9
+    }
 }
 
 /// True for a text that is a time of day, or starts with a date.
@@ -195,7 +200,8 @@ mod tests {
     #[test]
     fn time_stamps_have_fractions_and_zones_or_none() {
         let since = |first: &str, text: &str| {
-            Some((Stamp::parse(text)?.nanoseconds - Stamp::parse(first)?.nanoseconds) as f64 * 1e-9)
+            let first = Stamp::parse(first)?;
+            Some(Stamp::parse(text)?.since(first))
         };
         for (first, text, seconds) in [
             ("2026-01-31T23:59:58", "2026-02-01 00:00:00.25", Some(2.25)),
@@ -207,7 +213,7 @@ mod tests {
             ("31.01.2026 23:59:58", "1.2.2026 00:00:00,25", Some(2.25)),
             ("31.01.2026 23:59", "2026-01-31T23:59:01.5", Some(1.5)),
             ("9:59:58.5", "10:00:00", Some(1.5)),
-            ("0:00:00,000", "100:00:00,500", Some(360_000.5)),
+            ("0:00:00,000", "100:00:00,001", Some(360_000.001)),
             ("0:00:00", "0:60:00", None),
             ("0:00:00", "59:58.5", None),
             ("0:00:00", "12:00", None),
