@@ -334,6 +334,7 @@ class Answer:
 class Identified(Answer):
     """The linear spring that records show.
 
+    ``order`` counts its poles, ``undriven_order`` those beside it that the voltage does not drive.
     ``plant`` is the text of a plant file. ``courses`` holds the name of each record and its arrays of shape ``(n,)``: ``time_s``
     in s, ``voltage_v`` in V, ``reading``, ``model``, ``residual`` and ``held_out`` (reading minus a prediction by a fit that did
     not use the segment) in the reading's unit, without the readings of ``left_out`` and ``at_bound``.
@@ -342,6 +343,7 @@ class Identified(Answer):
     schema: int
     rows: int
     order: int
+    undriven_order: int
     nominal: LinearSpring
     oscillation: List[Oscillation]
     input_law: str
