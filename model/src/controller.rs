@@ -322,7 +322,8 @@ impl<E: Estimator> Config<E> {
         observed: Option<(&feedback::Config, Observed)>,
     ) -> Volts {
         let aim = self.aim(state, target, pursued);
-        it.voltage(&mut state.robust, aim, observed)
+        let correction = observed.map(|(config, observed)| (config, &state.feedback, observed));
+        it.voltage(&mut state.robust, aim, correction)
     }
 
     fn aim(&self, state: &State<E::State>, target: Volts, pursued: Volts) -> Aim {

@@ -136,6 +136,37 @@ fn with_a_sensor_a_share_far_beyond_the_margin_overshoots_little_both_ways() {
     }
 }
 
+/// The largest change of the voltage in a tick of `rate_hz` toward 500 V, or from there to 100 V, in V, as the codes show it.
+fn fastest_v(rate_hz: f64, sensor_noise_v: Option<f64>, downward: bool) -> f64 {
+    let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: OVERSHOOT };
+    let feedback = sensor_noise_v.map(|noise_v| Feedback { noise_v, interval_s: 1.0 / rate_hz, ..Feedback::TYPICAL });
+    let settings = Settings { rate_hz, ..settings(Compensation::Robust(margin), feedback) };
+    let config = settings.validate().unwrap().quantize();
+    let ticks = |volts, seconds: f64| std::iter::repeat_n(volts, (seconds * rate_hz) as usize);
+    let targets: Vec<f64> = ticks(0.0, 1.0).chain(ticks(500.0, 20.0)).chain(ticks(100.0, 2.0)).collect();
+    let spring = DifferingSpring::new(&PlantFile::from(settings.plant), &SpringError::default());
+    let samples = spring.closed_loop(&config, &targets, 1.0 / rate_hz, sensor_noise_v).unwrap();
+    let step = ((if downward { 21.0 } else { 1.0 }) * rate_hz) as usize;
+    let volts: Vec<f64> = samples[step - 1..].iter().map(|sample| f64::from(sample.code.0) * 1000.0 / 4095.0).collect();
+    let sign = if downward { -1.0 } else { 1.0 };
+    let within_s = 1.5;
+    volts.windows(2).take((within_s * rate_hz) as usize).map(|pair| sign * (pair[1] - pair[0])).fold(0.0, f64::max)
+}
+
+/// At every rate, in both directions; without a sensor nothing holds it back.
+#[test]
+fn with_a_sensor_the_voltage_rises_by_20_v_in_a_millisecond() {
+    let code_v = 1000.0 / 4095.0;
+    for (rate_hz, most_v) in [(500.0, 40.0), (1000.0, 20.0), (2000.0, 10.0)] {
+        for downward in [false, true] {
+            let fastest = fastest_v(rate_hz, Some(1.0), downward);
+            assert!((fastest - most_v).abs() <= code_v, "{rate_hz} Hz, downward {downward}: {fastest} V");
+            let free = fastest_v(rate_hz, None, downward);
+            assert!(free > 100.0, "{rate_hz} Hz, downward {downward}, no sensor: {free} V");
+        }
+    }
+}
+
 /// The same law in double precision, written from its equations, on a plain and on an extended spring.
 #[test]
 fn the_fixed_point_tick_agrees_with_double_precision() {

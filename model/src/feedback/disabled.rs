@@ -81,7 +81,7 @@ impl Config {
     }
 
     #[cfg(feature = "robust")]
-    pub(crate) fn follow(&self, _: Observed, _: &mut Accumulator, _: Signal) {
+    pub(crate) fn follow(&self, _: &State, _: Observed, _: &mut Accumulator, _: Signal) {
         match *self {}
     }
 

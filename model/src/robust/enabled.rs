@@ -126,16 +126,16 @@ impl Validated<'_, Margin> {
 }
 
 impl<E: Estimator> Robust<E> {
-    /// Returns the voltage that this law asks for, before the amplifier's limits. `feedback` is the correction and what it did with
-    /// the reading of this tick.
+    /// Returns the voltage that this law asks for, before the amplifier's limits. `feedback` is the correction with its state, and
+    /// what it did with the reading of this tick.
     #[inline(always)]
     pub(crate) fn voltage(
         &self,
         state: &mut State<E::State>,
         aim: Aim,
-        feedback: Option<(&feedback::Config, Observed)>,
+        feedback: Option<(&feedback::Config, &feedback::State, Observed)>,
     ) -> Volts {
-        let blind = feedback.is_none_or(|(_, observed)| observed == Observed::Untrusted);
+        let blind = feedback.is_none_or(|(_, _, observed)| observed == Observed::Untrusted);
         let quick = self.quick.predict(&state.quick, aim.applied).now;
         let changed = aim.target.0 != state.target;
         if changed {
@@ -147,8 +147,8 @@ impl<E: Estimator> Robust<E> {
             (state.base, state.trusted) = (quick, !blind);
         }
         let lead = self.lead(state, quick, aim.model);
-        if let Some((feedback, observed)) = feedback {
-            feedback.follow(observed, &mut state.seen, lead);
+        if let Some((feedback, correction, observed)) = feedback {
+            feedback.follow(correction, observed, &mut state.seen, lead);
         }
         let overshoot = if blind { self.overshoot_blind } else { self.overshoot };
         let (seen, most) = (upper(state.seen), saturated(overshoot.times(state.step)));

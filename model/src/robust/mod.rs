@@ -14,7 +14,8 @@
 //!
 //! ```text
 //! lead   = (q - y) + g (q - base)                 y: stiffness of the model, g: error of the gain
-//! seen'  = seen + L (lead - seen)                 at every reading, with the gain L of the sensor's correction
+//! seen'  = seen + L (lead - seen)                 at every reading, with the gain L of the sensor's correction,
+//!                                                 or 3/4 instead of L if that is what the correction has taken
 //! excess = part (lead - seen), at most overshoot |step|
 //! q + g (q - base)  ->  target - d + seen + excess
 //! ```

@@ -42,7 +42,7 @@ pub(super) struct Config {
     is_quick: bool,
 }
 
-/// Envelope of the innovations, the last one, and the mean of the last ones, of which each has a quarter of the weight of all before.
+/// Envelope of the innovations, the last one, and the mean of the last ones, of which each has a third of the weight of all before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct State {
     innovations: Envelope,
@@ -57,6 +57,14 @@ pub(super) struct Influence {
     pub(super) clipped: Signal,
     /// Part of the innovation that is added without delay, in V.
     pub(super) quick: Signal,
+}
+
+impl State {
+    /// Forgets the last innovations: those before a time without trust in the sensor say nothing about the ones after it.
+    #[inline]
+    pub(super) fn forget(&mut self) {
+        (self.last, self.mean) = (Signal::ZERO, Signal::ZERO);
+    }
 }
 
 impl Config {

@@ -81,22 +81,25 @@ impl Config {
                 (state.oscillation.reduce(step), observed)
             }
             (Sensor::Trusted, None) => (Accumulator::ZERO, Observed::Nothing),
-            _ => (self.fade.step(Signal::ZERO.saturating_sub(correction)), Observed::Untrusted),
+            _ => {
+                state.influence.forget();
+                (self.fade.step(Signal::ZERO.saturating_sub(correction)), Observed::Untrusted)
+            }
         };
         state.correction = state.correction.saturating_add(step);
         (state.corrected(target), observed)
     }
 
     /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, without delay at one that shows the
-    /// spring ahead, and back to 0 V while the sensor is not trusted.
+    /// spring ahead, both reduced after an oscillation, and back to 0 V while the sensor is not trusted.
     #[inline]
     #[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
-    pub(crate) fn follow(&self, observed: Observed, seen: &mut Accumulator, signal: Signal) {
+    pub(crate) fn follow(&self, state: &State, observed: Observed, seen: &mut Accumulator, signal: Signal) {
         let distance = |to: Signal| to.saturating_sub(upper(*seen));
         let step = match observed {
-            Observed::Reading => self.gain.step(distance(signal)),
+            Observed::Reading => state.oscillation.reduce(self.gain.step(distance(signal))),
             // As much of it as the correction has taken of the innovation.
-            Observed::Ahead => widened(distance(signal)) - (widened(distance(signal)) >> 2),
+            Observed::Ahead => state.oscillation.reduce(widened(distance(signal)) - (widened(distance(signal)) >> 2)),
             Observed::Nothing => Accumulator::ZERO,
             Observed::Untrusted => self.fade.step(distance(Signal::ZERO)),
         };
@@ -120,6 +123,7 @@ impl State {
     /// Prepares the state for another configuration; `None` is one without a sensor.
     pub(crate) fn transfer_to(&mut self, config: Option<&Config>) {
         if config.is_some() {
+            self.influence.forget();
             self.oscillation = oscillation::State::default();
         } else {
             *self = Self::default();
@@ -163,18 +167,54 @@ mod tests {
     use crate::units::SampleTime;
     use crate::validated::Validate;
 
-    /// Otherwise the margin would be kept for what the correction has taken.
+    fn quick() -> Config {
+        Feedback::TYPICAL.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize(true)
+    }
+
+    /// Otherwise the margin would be kept for what the correction has taken, or given up for what it has not.
     #[test]
     fn what_is_seen_follows_as_much_as_the_correction_has_taken() {
-        let feedback = Feedback::TYPICAL;
-        let config = feedback.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize(true);
-        let seen = |observed| {
+        let (feedback, config) = (Feedback::TYPICAL, quick());
+        let seen_in = |state: &State, observed| {
             let mut seen = widened(Signal::from_num(20));
-            config.follow(observed, &mut seen, Signal::from_num(100));
+            config.follow(state, observed, &mut seen, Signal::from_num(100));
             upper(seen).to_num::<f64>()
         };
+        let seen = |observed| seen_in(&State::default(), observed);
         assert_eq!((seen(Observed::Nothing), seen(Observed::Ahead)), (20.0, 80.0));
         assert!((seen(Observed::Reading) - (20.0 + 80.0 * feedback.gain())).abs() < 1e-3);
         assert!((19.0..20.0).contains(&seen(Observed::Untrusted)));
+        let reduced = State { oscillation: oscillation::State::reduced(1), ..State::default() };
+        assert_eq!(seen_in(&reduced, Observed::Ahead), 20.0 + 60.0 / 4.0);
+        assert!((seen_in(&reduced, Observed::Reading) - (20.0 + 80.0 / 4.0 * feedback.gain())).abs() < 1e-3);
+    }
+
+    /// A spring that is two and a half deviations of the noise ahead of a model that moves.
+    #[test]
+    fn a_reading_before_a_time_without_trust_is_not_the_first_of_two() {
+        let (config, volts) = (quick(), |volts: f64| ScaledStiffness(Signal::from_num(volts)));
+        let ahead = Some(2.5 * Feedback::TYPICAL.noise_v);
+        // Readings differ by 0.1 V, as equal ones would be those of a stuck sensor.
+        let tick = |state: &mut State, number: u32, ahead: Option<f64>| {
+            let model = 0.2 * f64::from(number);
+            let reading = ahead.map(|ahead| model - 0.2 + ahead + 0.1 * (f64::from(number % 3) - 1.0));
+            let reading = reading.map(|reading| Reading { stiffness: volts(reading), age: 0 });
+            let (_, observed) = config.update(state, Volts(Signal::from_num(500)), reading);
+            config.estimate(state, volts(model));
+            observed
+        };
+        let (mut state, mut ticks) = (State::default(), 1..2000);
+        ticks.by_ref().take(500).for_each(|number| drop(tick(&mut state, number, Some(0.0))));
+        let number = ticks.next().unwrap();
+        assert_eq!(tick(&mut state, number, ahead), Observed::Reading, "one ahead");
+        let (mut next, number) = (state, ticks.next().unwrap());
+        assert_eq!(tick(&mut next, number, ahead), Observed::Ahead, "two of them");
+        assert!(ticks.any(|number| tick(&mut state, number, None) == Observed::Untrusted));
+        let mut again = ticks.map(|number| tick(&mut state, number, ahead));
+        assert_eq!(
+            again.find(|observed| matches!(observed, Observed::Reading | Observed::Ahead)),
+            Some(Observed::Reading)
+        );
+        assert_eq!(again.next(), Some(Observed::Ahead));
     }
 }

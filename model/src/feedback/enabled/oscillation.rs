@@ -92,6 +92,12 @@ impl State {
     pub(super) fn reduce(&self, step: Accumulator) -> Accumulator {
         Accumulator::from_bits(step.to_bits() >> (2 * self.reductions))
     }
+
+    /// The state after as many reductions of the gain.
+    #[cfg(test)]
+    pub(super) fn reduced(reductions: u8) -> Self {
+        Self { reductions, ..Self::default() }
+    }
 }
 
 #[cfg(test)]
