@@ -335,6 +335,11 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
             "line 3, column time: `2026-01-31T10:00:01` is not a time of day, as in the first row; expected another such",
         ),
         (
+            "time,u_V,x_mm\n25:00:00,1,2\n1:00:01,1,2\n".into(),
+            &any,
+            "line 3, column time: 1:00:01 follows a later or equal time; expected increasing times",
+        ),
+        (
             "time,u_V,x_mm\n10:00:01,1,2\n10:00:00,1,2\n".into(),
             &any,
             "line 3, column time: 10:00:00 follows a later or equal time; expected increasing times",

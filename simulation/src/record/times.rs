@@ -34,6 +34,8 @@ pub(super) struct Clock {
     first: Option<First>,
     /// The last time of day, in ns since the first midnight.
     last: i128,
+    /// True once a time has 24 h or more: those of a stopwatch, which do not begin again after midnight.
+    is_stopwatch: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +74,11 @@ impl Clock {
         match (first, stamp) {
             (First::Stamp(first), Some(mut stamp)) if first.form == stamp.form => {
                 if stamp.form == Form::TimeOfDay {
-                    // After midnight a clock begins again.
-                    stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
+                    self.is_stopwatch |= stamp.nanoseconds >= DAY_NS;
+                    if !self.is_stopwatch {
+                        // After midnight a clock begins again: a time that is earlier by 12 h or more is one of the next day.
+                        stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
+                    }
                     self.last = stamp.nanoseconds;
                 }
                 let since_first = stamp.since(first);
