@@ -131,7 +131,7 @@ fn two_faults_of_one_tick_are_both_reported_and_heard_of() {
     let mcu = Mcu::on_socket(Setup::default());
     let port = &mcu.port;
     let kept = start(port, &["set", "100", "--arm", "--keep", "inf"]);
-    mcu.wait_for(State::Armed);
+    mcu.wait_for_target(100.0);
     mcu.with(|shared| (shared.interlock_open, shared.fault) = (true, Some(supervisor::Fault::Watchdog)));
     let remarks = String::from_utf8(kept.wait_with_output().unwrap().stderr).unwrap();
     let again = bad(1, port, &["arm"]);
@@ -139,6 +139,19 @@ fn two_faults_of_one_tick_are_both_reported_and_heard_of() {
         assert_eq!(remarks.matches(report).count(), 1, "{report}: {remarks}");
         assert!(!again.contains(report), "it was heard of: {again}");
     }
+}
+
+#[test]
+fn a_command_prints_the_reports_that_it_received() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    mcu.with(|shared| shared.fault = Some(supervisor::Fault::Watchdog));
+    mcu.wait_for(State::Faulted);
+    let status = start(port, &["status"]).wait_with_output().unwrap();
+    let remarks = String::from_utf8(status.stderr).unwrap();
+    assert_eq!(remarks.matches("fault watchdog (5) at tick ").count(), 1, "{remarks}");
+    let again = bad(1, port, &["arm"]);
+    assert!(!again.contains(" at tick "), "it was heard of: {again}");
 }
 
 #[test]

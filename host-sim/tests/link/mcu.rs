@@ -196,15 +196,24 @@ impl Mcu {
 
     /// Waits until the MCU is in `state`, at most 10 s.
     pub(crate) fn wait_for(&self, state: State) -> Telemetry {
+        self.wait_until(&state.to_string(), |sample| sample.state == state)
+    }
+
+    /// Waits until the MCU has this target in V, at most 10 s.
+    pub(crate) fn wait_for_target(&self, volts: f64) -> Telemetry {
+        self.wait_until(&format!("at {volts} V"), |sample| sample.target.to_f64() == volts)
+    }
+
+    fn wait_until(&self, what: &str, reached: impl Fn(&Telemetry) -> bool) -> Telemetry {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(10) {
             let sample = self.with(|shared| shared.sample);
-            if sample.state == state {
+            if reached(&sample) {
                 return sample;
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        panic!("never {state}: {:?}", self.with(|shared| shared.sample));
+        panic!("never {what}: {:?}", self.with(|shared| shared.sample));
     }
 
     /// `exchange` sends its second argument (`None` hangs up) and reads into its first.

@@ -39,7 +39,7 @@ impl Session {
         Ok(self.status)
     }
 
-    /// Names on stderr the faults that the MCU has reported.
+    /// Names on stderr the faults that the MCU has reported since the last call.
     fn show_reports(&mut self) {
         for report in self.client.reports() {
             let name = self.client.name();
@@ -109,7 +109,6 @@ impl Session {
     pub(super) fn still_armed(&mut self, state: link::State) -> Result<()> {
         if !matches!(state, link::State::Armed | link::State::Ramping) {
             self.refresh()?;
-            self.show_reports();
             bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
         }
         Ok(())
@@ -126,6 +125,13 @@ impl Session {
             std::thread::sleep(pause.min(time.saturating_sub(start.elapsed())));
         }
         Ok(())
+    }
+}
+
+impl Drop for Session {
+    /// The MCU repeats no report that this program has received, so none ends with a request that was refused.
+    fn drop(&mut self) {
+        self.show_reports();
     }
 }
 
