@@ -274,15 +274,15 @@ struct Isolation {
     /// Causes that are a fault once they are named: bit 0 for number 0.
     std::uint16_t trip_on_cause = 0;
 
-    /// `quiet`, `alarm`, `unknown`, `named`, `ambiguous` or `off`.
+    /// `quiet`, `alarm`, `unknown`, `named`, `ambiguous`, `off`, or `unknown-code` for a verdict that this version does not know.
     const char* word() const {
         static const char* const words[] = {"quiet", "alarm", "unknown", "named", "ambiguous", "off"};
-        return verdict >> 8 < 6 ? words[verdict >> 8] : "unknown-code";
+        return is_known() ? words[verdict >> 8] : "unknown-code";
     }
     /// Name of the cause that explains most; empty unless one is named or two are ambiguous.
     const char* cause() const { return has_cause() ? cause_name(verdict & 15) : ""; }
     /// Name of the other cause; empty unless two are ambiguous.
-    const char* other() const { return verdict >> 8 == 4 ? cause_name(verdict >> 4 & 15) : ""; }
+    const char* other() const { return has_cause() && verdict >> 8 == 4 ? cause_name(verdict >> 4 & 15) : ""; }
 
     static Isolation read(wire::Reader& from) {
         Isolation said;
@@ -297,7 +297,12 @@ struct Isolation {
     }
 
 private:
-    bool has_cause() const { return verdict >> 8 == 3 || verdict >> 8 == 4; }
+    /// False for a code that this version does not know, as one with bits that its verdict has no use for.
+    bool is_known() const {
+        static const unsigned used[] = {0, 0, 0, 0x0f, 0xff, 0xff};
+        return verdict >> 8 < 6 && (verdict & 0xff & ~used[verdict >> 8]) == 0;
+    }
+    bool has_cause() const { return is_known() && (verdict >> 8 == 3 || verdict >> 8 == 4); }
     static const char* cause_name(unsigned number) {
         static const char* const names[] = {
             "gain-error",        "instantaneous-share", "time-constant", "voltage-dependent-time-constant",
@@ -568,12 +573,13 @@ public:
         double ticks = 0;
         if (rate_hz != 0) ticks = std::clamp(std::round(status_.rate_hz / rate_hz), 1.0, 65535.0);
         samples_.clear();
+        if (ticks != 0) isolation_.reset();
         every_ticks_ = static_cast<std::uint16_t>(ticks);
         order(wire::Writer().byte(7).number(every_ticks_).bytes);
     }
 
-    /// What the isolation bank has said last with the telemetry: when its verdict changes, and once per second. Nothing without
-    /// telemetry, and from a program without it.
+    /// What the isolation bank has said last with the telemetry asked for last: after the request, when its verdict changes, and
+    /// once per second. Nothing before the first of these, and from a program that does not send it.
     std::optional<Isolation> isolation() {
         const Lock lock(mutex_);
         return isolation_;
@@ -772,7 +778,8 @@ private:
                 auto packet = encoded_.size() <= wire::most_encoded ? wire::open(encoded_) : std::nullopt;
                 encoded_.clear();
                 if (!packet || packet->message.empty()) continue;
-                if (packet->kind == wire::notice_kind && packet->version == wire::version) notice(packet->message);
+                if (packet->kind == wire::notice_kind && packet->version == wire::version && packet->session == session_)
+                    notice(packet->message);
                 if (packet->kind != wire::reply_kind) continue;
                 if (packet->version != wire::version) return packet;
                 wire::Reader from(packet->message);

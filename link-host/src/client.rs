@@ -117,8 +117,8 @@ impl Client {
         std::mem::take(&mut self.reports)
     }
 
-    /// What the isolation bank has said last with the telemetry of this session: when its verdict changes, and once per second. `None`
-    /// without telemetry, and if the MCU's program has no bank or does not send what it says.
+    /// What the isolation bank has said last with the telemetry asked for last: after the request, when its verdict changes, and once per
+    /// second. `None` before the first of these, and if the MCU's program does not send what the bank says.
     pub fn verdict(&self) -> Option<IsolationReport> {
         self.verdict
     }
@@ -154,6 +154,10 @@ impl Client {
         }
         if let Request::Stream { every_ticks } = request {
             self.every_ticks = every_ticks;
+            if every_ticks > 0 {
+                // That of an earlier stream says nothing about the samples to come.
+                self.verdict = None;
+            }
         }
         let reply = self.exchange(request);
         if matches!(reply, Ok(_) | Err(Failure::Refused(_))) {
@@ -214,7 +218,9 @@ impl Client {
                     Err(Unreadable::Version(version)) => return Ok(Some(answer(&packet, Err(version)))),
                     Err(Unreadable::Kind) => {
                         // Otherwise an echo of our own frame.
-                        if let Ok(Notice::Isolation(report)) = packet.read() {
+                        if let Ok(Notice::Isolation(report)) = packet.read()
+                            && packet.session() == self.session
+                        {
                             self.verdict = Some(report);
                         }
                     }
@@ -319,13 +325,14 @@ mod tests {
     }
 
     #[test]
-    fn a_verdict_that_comes_with_the_telemetry_is_forgotten_with_its_session() {
+    fn a_verdict_that_comes_with_the_telemetry_is_forgotten_with_its_stream_and_its_session() {
         let (mut client, thread) = connected(|_| Faults::NONE);
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
         client.order(Request::Stream { every_ticks: 0 }).unwrap();
         assert_eq!(client.verdict().map(|report| report.verdict), Some(VERDICT));
-        // Its verdict is on the way while another session is asked for.
+        // Another stream, whose verdict is on the way while another session is asked for.
         client.order(Request::Stream { every_ticks: 1 }).unwrap();
+        assert_eq!(client.verdict(), None);
         client.begin().unwrap();
         assert_eq!(client.verdict(), None);
         drop(client);

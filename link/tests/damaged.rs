@@ -106,11 +106,14 @@ fn frames() -> impl Strategy<Value = Vec<(u16, Request, Damage)>> {
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn ten_thousand_corrupted_streams_yield_only_packets_that_were_sent() {
-    let replies = (frames(), any::<u16>(), common::reply());
+    let sent = (frames(), any::<u16>(), common::reply(), prop::option::of(common::notice()));
     let (kept, lost) = (Cell::new(0), Cell::new(0));
     runner()
-        .run(&replies, |(sent, sequence, reply)| {
-            let last = Frame::new(Sequence(sequence), &reply);
+        .run(&sent, |(sent, sequence, reply, notice)| {
+            let last = notice.map_or_else(
+                || Frame::new(Sequence(sequence), &reply),
+                |notice| Frame::new(Sequence(sequence), &notice),
+            );
             let frames: Vec<Frame> =
                 sent.iter().map(|(sequence, request, _)| Frame::new(Sequence(*sequence), request)).collect();
             let mut allowed: Vec<Content> = frames.iter().map(only).collect();

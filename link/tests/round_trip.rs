@@ -45,9 +45,19 @@ proptest! {
         prop_assert!(!frame.as_bytes().is_empty());
         prop_assert_eq!(decode(&frame), vec![(stamp, reply)]);
     }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
+    fn a_notice_survives_a_round_trip_and_is_not_a_reply(sequence: u16, session: u32, notice in common::notice()) {
+        let stamp = Nonce(session).stamp(Sequence(sequence));
+        let frame = Frame::new(stamp, &notice);
+        prop_assert!(!frame.as_bytes().is_empty());
+        prop_assert_eq!(decode(&frame), vec![(stamp, notice)]);
+        prop_assert!(is_not_a_reply(&frame));
+    }
 }
 
-/// A host that receives the echo of its own request does not accept it as a reply.
+/// A host does not accept the echo of its own request, or a notice, as a reply.
 fn is_not_a_reply(frame: &Frame) -> bool {
     let mut receiver = Receiver::new();
     frame.as_bytes().iter().all(|&byte| receiver.on_byte(byte).is_none_or(|packet| packet.read::<Reply>().is_err()))

@@ -20,7 +20,8 @@ class Isolation:
     Attributes
     ----------
     verdict
-        ``"quiet"``, ``"alarm"``, ``"named"``, ``"ambiguous"``, ``"unknown"``, or ``"off"`` if no bank runs.
+        ``"quiet"``, ``"alarm"``, ``"named"``, ``"ambiguous"``, ``"unknown"``, ``"off"`` if no bank runs, or
+        ``"unknown-code"`` for one that this version does not know.
     cause, other
         The cause that explains most, and the other one if two are ambiguous; ``None`` otherwise.
     since_s

@@ -254,8 +254,8 @@ impl Server {
         self.session.drop_telemetry(1);
     }
 
-    /// True if the host receives telemetry and has to hear of the isolation bank's verdict with this code: with the first sample, when
-    /// it has changed, and once per second.
+    /// True if the host receives telemetry and has to hear of the isolation bank's verdict with this code: after the request for
+    /// telemetry, when it has changed, and once per second.
     pub fn verdict_due(&self, verdict: u16, view: &View) -> bool {
         self.session.verdict_due(verdict, view.sample.tick, self.about.rate_hz)
     }

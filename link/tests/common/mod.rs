@@ -6,8 +6,8 @@ use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch, Part,
-    Reason, Reply, Request, Sensor, State, Status, Telemetry, WireVolts,
+    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch,
+    Notice, Part, Reason, Reply, Request, Sensor, State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -155,6 +155,24 @@ fn model() -> impl Strategy<Value = BlockId> {
     })
 }
 
+fn isolation() -> impl Strategy<Value = IsolationReport> {
+    (any::<[u64; 2]>(), any::<[u16; 2]>(), [number(), number(), number()]).prop_map(
+        |([tick, since_tick], [verdict, trip_on_cause], [size, half_width, explained])| IsolationReport {
+            tick,
+            verdict,
+            since_tick,
+            size,
+            half_width,
+            explained,
+            trip_on_cause,
+        },
+    )
+}
+
+pub(crate) fn notice() -> impl Strategy<Value = Notice> {
+    isolation().prop_map(Notice::Isolation)
+}
+
 pub(crate) fn reply() -> impl Strategy<Value = Reply> {
     prop_oneof![
         (state(), volts()).prop_map(|(state, target)| Reply::Ack { state, target }),
@@ -168,12 +186,7 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
         }),
         any::<[u32; 3]>().prop_map(|[most, wanted, captured]| Reply::Captured(Captured { most, wanted, captured })),
         any::<(u32, u8, [[u8; 8]; ROWS])>().prop_map(|(first, count, rows)| Reply::Rows(Rows { first, count, rows })),
-        (any::<[u64; 2]>(), any::<[u16; 2]>(), [number(), number(), number()]).prop_map(
-            |([tick, since_tick], [verdict, trip_on_cause], [size, half_width, explained])| {
-                let report = IsolationReport { tick, verdict, since_tick, size, half_width, explained, trip_on_cause };
-                Reply::Isolation(report)
-            }
-        ),
+        isolation().prop_map(Reply::Isolation),
         (any::<[u64; 2]>(), any::<u8>(), any::<u32>(), prop::collection::vec(number(), 8)).prop_map(
             |([tick, exchange_tick], phase, exchanges, numbers)| {
                 let (ratios, bounds) = ([numbers[0], numbers[1], numbers[2]], [numbers[3], numbers[4], numbers[5]]);
