@@ -21,7 +21,7 @@
 //! So do causes that are each likely, if the product of their probabilities is below [`LIKELY_TOGETHER`].
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
-use crate::stats::thresholds::empirical::{IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
+use crate::stats::thresholds::empirical::{IF_IDENTIFIED, IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
 use crate::verdict::extrapolation::Spoils;
 use crate::verdict::finding::explained;
 
@@ -36,6 +36,9 @@ const APART: [&str; 2] = ["hum", "outliers"];
 
 /// Causes that a drift, or what an earlier voltage left behind, may be taken for.
 const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series-lag"];
+
+/// Causes that are linear dynamics of the spring, of which an identified one has its own.
+const LINEAR: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
 
 /// Lowers probabilities by the chance that a law which no cause describes is behind a finding.
 pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
@@ -72,6 +75,18 @@ pub(crate) fn in_unexplained(findings: &mut [Finding], structure: f64) {
 pub(crate) fn of_slow(findings: &mut [Finding]) {
     let slow = findings.iter_mut().filter(|finding| SLOW.contains(&finding.cause));
     slow.for_each(|finding| lower(finding, IF_UNEXPLAINED.get()));
+}
+
+/// Lowers probabilities of linear dynamics beside a nominal spring that was identified from the same readings: what it lacks of them
+/// belongs to it.
+pub(crate) fn of_identified(findings: &mut [Finding]) {
+    let linear = findings.iter_mut().filter(|finding| LINEAR.contains(&finding.cause));
+    linear.for_each(|finding| lower(finding, IF_IDENTIFIED.get()));
+}
+
+/// True if there are linear dynamics among the causes, and no likely cause beside them.
+pub(crate) fn are_linear(findings: &[Finding]) -> bool {
+    findings.iter().any(|finding| LINEAR.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
 }
 
 /// Lowers probabilities of causes that spoil an extrapolation.
@@ -190,6 +205,17 @@ mod tests {
         in_unexplained(&mut findings, 0.5);
         let [large, small] = probabilities(&findings)[..] else { panic!() };
         assert!((0.89..0.9).contains(&large) && small < 0.5, "{large} {small}");
+    }
+
+    #[test]
+    fn linear_dynamics_beside_an_identified_spring_are_suspects() {
+        let mut findings = [probable("hysteresis", 0.95), probable("series-lag", 0.9)];
+        of_identified(&mut findings);
+        assert!(findings[0].probability == 0.95 && findings[1].probability < IMPROBABLE, "{findings:?}");
+        assert!(!are_linear(&findings), "the likely cause is none of them");
+        assert_eq!(likely_alone(&findings), None, "nothing is left open");
+        assert!(are_linear(&findings[1..]) && are_linear(&[probable("hysteresis", 0.3), probable("delay", 0.01)]));
+        assert!(!are_linear(&[]) && !are_linear(&[probable("hysteresis", 0.3)]));
     }
 
     fn probable(cause: &'static str, probability: f64) -> Finding {

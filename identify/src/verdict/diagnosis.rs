@@ -122,7 +122,11 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         credibility::of_slow(&mut findings);
     }
     let unearned = is_unearned(&findings, extended);
-    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned;
+    if data.normalisation.identified {
+        credibility::of_identified(&mut findings);
+    }
+    let lacking = data.normalisation.identified && credibility::are_linear(&findings);
+    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned || lacking;
     credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
@@ -181,6 +185,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
             Some(spoils) => Some(spoils.sentence(data.scales())),
             None if unfinished => Some(UNFINISHED.to_owned()),
             None if unearned => Some(UNEARNED.to_owned()),
+            None if lacking => Some(LACKING.to_owned()),
             None => left(),
         },
         noise: noise_report(&extended.noise),
@@ -252,6 +257,9 @@ const UNFINISHED: &str = "The search ended before it had tried all that it would
 /// The report's sentence on causes that remove little of an autocorrelated error.
 const UNEARNED: &str =
     "The residual is autocorrelated, slow noise or an error of the simulation, and no cause removes much of it";
+
+/// The report's sentence on linear dynamics that an identified spring lacks.
+const LACKING: &str = "Further linear dynamics explain part of the error, but the nominal spring was identified from these readings: they are part of it, or take the place of a cause that no model describes";
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {

@@ -118,6 +118,8 @@ thresholds! {
     PRICE_OF_RUN = 1.25, "nats for each unit of ln(rows)";
     /// Errors are clipped here when the run of shifted readings is searched.
     CLIP_FOR_RUN = 6.0, "scales of the noise";
+    /// Autocorrelation of errors from which they are whitened when the run is searched.
+    WHITENED_FROM = 0.5, "correlation of neighbouring rows";
     /// Number of first rows from which the sensor's zero is estimated.
     ROWS_FOR_ZERO = 10.0, "rows";
     /// Smallest time constant of a charge leakage; a faster loss hardly lets the stiffness fall and looks like a gain.
@@ -221,6 +223,8 @@ thresholds! {
     UNKNOWN_NOISE = 0.1, "of the mean square that is left", set by "cargo campaign out-of-model";
     /// Largest probability of a cause in a record with the verdict `unexplained`.
     IF_UNEXPLAINED = 0.9, "probability", set by "cargo campaign out-of-model";
+    /// Largest probability of linear dynamics beside a nominal spring that was identified from the same readings.
+    IF_IDENTIFIED = 0.05, "probability", set by "cargo campaign identified";
     /// Largest probability of a cause with which the last 40 % of the record are predicted worse than without it.
     IF_SPOILING = 0.5, "probability";
     /// Readings at a bound have saturated if the stiffness exceeds the bound by more in the mean.
