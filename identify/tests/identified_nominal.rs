@@ -100,3 +100,18 @@ fn linear_spring_is_consistent_with_what_was_identified() {
     let ratio = report.extended.quality.rmse / report.baseline.rmse;
     assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
+
+/// The zero of the sensor steps in the middle of the record. An identified spring that followed the step would hide it.
+#[test]
+fn shifted_zero_is_named_alone() {
+    let mut shifted = record(|voltage| 2.0 - 0.5 * voltage, &[9.0, 2.0], 0.02);
+    shifted.rows[537..].iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + 0.4));
+    let (diagnosis, _) = diagnosed(shifted);
+    let report = &diagnosis.report;
+    let causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert_eq!((report.verdict, causes), (Verdict::Explained, vec!["reading-offset"]), "{report:?}");
+    let offset = report.findings[0].parameters.iter().find(|(name, _)| name == "offset").unwrap().1.value;
+    assert!((offset.abs() / 0.4 - 1.0).abs() < 0.1, "{offset}");
+    let tau_s = diagnosis.plant.relaxation.tau_s[0];
+    assert!((tau_s / 9.0 - 1.0).abs() < 0.1, "{tau_s} s");
+}

@@ -107,6 +107,15 @@ class AtBound:
 
 
 @dataclass(frozen=True)
+class ZeroShift:
+    """A shift of a record's readings ``by`` a constant, in their unit, ``from_s`` on, in s."""
+
+    record: str
+    from_s: float
+    by: float
+
+
+@dataclass(frozen=True)
 class ErrorStatistics:
     """The errors that the linear spring leaves."""
 
@@ -356,6 +365,7 @@ class Identified(Answer):
     noise: ErrorStatistics
     left_out: List[FarReading]
     at_bound: List[AtBound]
+    zero_shifts: List[ZeroShift]
     remarks: List[str]
     unit: str
     model: Optional[str]

@@ -12,8 +12,9 @@ use crate::effects::offset_levels::{Stretch, stretches};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
-use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, PRICE_OF_RUN, ROWS_FOR_ZERO, SHORTEST_RUN};
-use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_RARE, Z_ZERO};
+use crate::stats::shifted_run::{ShiftedRun, shifted_run};
+use crate::stats::thresholds::empirical::{PRICE_OF_RUN, ROWS_FOR_ZERO};
+use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_ZERO};
 
 pub(super) struct ReadingOffset;
 
@@ -70,70 +71,10 @@ fn shows_at_rest(data: &Data) -> bool {
     zero.abs() > Z_ZERO * error
 }
 
-/// Returns the run whose shift reduces the squared error most, among runs of growing length; NaN rows count neither for
-/// nor against it.
-fn best_run(FitContext { residual, sigma, .. }: &FitContext) -> Option<Vec<f64>> {
-    let rows = residual.len();
-    let bound = CLIP_FOR_RUN.get() * sigma;
-    let (mut sums, mut counts) = (vec![0.0], vec![0]);
-    for (row, value) in residual.iter().enumerate() {
-        let clipped = if value.is_nan() { 0.0 } else { value.clamp(-bound, bound) };
-        sums.push(sums[row] + clipped);
-        counts.push(counts[row] + usize::from(!value.is_nan()));
-    }
-    let gain = |from: usize, to: usize| match counts[to] - counts[from] {
-        seen if seen < SHORTEST_RUN.count() => 0.0,
-        seen => (sums[to] - sums[from]).powi(2) / seen as f64,
-    };
-    let longest = rows / 2;
-    let mut best = (0.0, 0, 0);
-    let mut length = SHORTEST_RUN.count();
-    while length <= longest {
-        for from in 0..=rows - length {
-            let found = gain(from, from + length);
-            if found > best.0 {
-                best = (found, from, from + length);
-            }
-        }
-        length += (length / 5).max(1);
-    }
-    let (_, from, to) = refined(best.1, best.2, rows, &gain)?;
-    // The median is not affected by an outlier in the run.
-    let mut run: Vec<f64> = residual[from..to].iter().copied().filter(|value| !value.is_nan()).collect();
-    let noise = robust_deviation(second_differences(&run)).unwrap_or(0.0);
-    let shift = median(&mut run)?;
-    // In a burst of stronger noise the mean of a run is far from 0 by chance.
-    (shift.abs() * (run.len() as f64).sqrt() > Z_RARE * noise).then(|| vec![from as f64, to as f64, shift])
-}
-
-/// Returns the best run whose edges are close to those of the given one.
-fn refined(from: usize, to: usize, rows: usize, gain: &impl Fn(usize, usize) -> f64) -> Option<(f64, usize, usize)> {
-    if to <= from {
-        return None;
-    }
-    let reach = ((to - from) / 4).clamp(3, 400);
-    let mut best = (gain(from, to), from, to);
-    for _ in 0..3 {
-        let before = best;
-        for edge in
-            best.1.saturating_sub(reach)..=(best.1 + reach).min(best.2 - SHORTEST_RUN.count().min(best.2 - best.1))
-        {
-            let found = gain(edge, best.2);
-            if found > best.0 && best.2 - edge >= SHORTEST_RUN.count() {
-                best = (found, edge, best.2);
-            }
-        }
-        for edge in (best.1 + SHORTEST_RUN.count()).max(best.2.saturating_sub(reach))..=(best.2 + reach).min(rows) {
-            let found = gain(best.1, edge);
-            if found > best.0 {
-                best = (found, best.1, edge);
-            }
-        }
-        if best == before {
-            break;
-        }
-    }
-    Some(best)
+/// Returns the point of the run whose shift explains most.
+fn best_run(context: &FitContext) -> Option<Vec<f64>> {
+    let ShiftedRun { from, to, shift } = shifted_run(context.residual, context.sigma)?;
+    Some(vec![from as f64, to as f64, shift])
 }
 
 impl Effect for ReadingOffset {

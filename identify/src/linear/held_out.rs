@@ -45,8 +45,8 @@ pub(super) fn by_refit(problem: &Problem, fit: &Fit) -> Vec<f64> {
 
 pub(super) fn by_step(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let several = problem.series.len() > 1;
-    // Of several records, zero and start come from the held-out record itself; all other columns are orthogonal to theirs.
-    let first = if several { problem.series.len() * Problem::own_columns(fit.poles.order()) } else { 0 };
+    // Of several records, zero, its shifts and start come from the held-out record itself; all other columns are orthogonal to theirs.
+    let first = if several { problem.columns_of_records(fit.poles.order()) } else { 0 };
     let columns: Vec<&Column> = fit.basis.q[first..].iter().filter(|column| !column.values.is_empty()).collect();
     let kept = 1.0 - LEAST_INFORMATION.get();
     let mut left = fit.residual.clone();

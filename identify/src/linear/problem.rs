@@ -1,8 +1,10 @@
 //! The least-squares problem of one or several records: a model's residual, its linear coefficients, and their refinement.
 //!
 //! Given the denominator and the delay, everything else is linear: of each record the zero and the free response, of all records
-//! together the instantaneous part and the numerator. So only the denominator and the delay are searched, by Levenberg-Marquardt
+//! together the instantaneous part and the numerator; so is a shift of the zero from a given time on. So only the denominator and the delay are searched, by Levenberg-Marquardt
 //! steps on the residual that remains after the linear fit (variable projection, Golub and Pereyra 1973, with Kaufman's Jacobian).
+
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -82,7 +84,7 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// Sum of the squared residuals.
     pub cost: f64,
-    /// Coefficients of the columns of [`Fit::basis`]: those of each record, then those of all.
+    /// Coefficients of the columns of [`Fit::basis`]: those of each record, its shifts, then those of all.
     pub(super) coefficients: Vec<f64>,
     /// Orthonormal columns; those of the searched parameters only after [`Problem::linearised`].
     pub(super) basis: Orthonormal,
@@ -132,7 +134,7 @@ impl Fit {
         with_own.filter(|(index, ..)| !self.poles.undriven.contains(index)).map(|(_, section, own)| (section, own))
     }
 
-    /// All parameters in the order of the basis: those of each record, then instantaneous part and numerators, then, of a linearised
+    /// All parameters in the order of the basis: those of each record, their shifts, then instantaneous part and numerators, then, of a linearised
     /// fit, the logarithms of the sections' parameters and the delay in spacings.
     pub fn parameters(&self, problem: &Problem) -> Vec<f64> {
         let searched = self.basis.count() - self.coefficients.len();
@@ -274,6 +276,10 @@ impl Problem {
         let responses = self.responses(&paths, &fit.poles.sections);
         let shared = fit.shared();
         let mut residual = self.readings.values.clone();
+        for ((record, from), shift) in self.shifts().zip(self.shift_sizes(fit)) {
+            let start = self.starts[record];
+            residual[start + from..start + paths[record].voltage.len()].iter_mut().for_each(|row| *row -= shift);
+        }
         for (record, (path, &first)) in paths.iter().zip(&self.starts).enumerate() {
             let rows = &mut residual[first..first + path.voltage.len()];
             let mine = fit.own(record);
@@ -346,9 +352,32 @@ impl Problem {
         1 + order
     }
 
+    /// Number of columns that are zero in all but one record.
+    pub(super) fn columns_of_records(&self, order: usize) -> usize {
+        self.series.len() * Self::own_columns(order) + self.shifts().count()
+    }
+
     /// Number of columns that are linear: those of each record, the instantaneous part, the numerator.
     pub(super) fn linear_columns(&self, order: usize) -> usize {
-        self.series.len() * Self::own_columns(order) + 1 + order
+        self.columns_of_records(order) + 1 + order
+    }
+
+    /// The record and the first row in it of each shift of a zero, in the order of the columns.
+    fn shifts(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.series.iter().enumerate().flat_map(|(record, series)| {
+            series.shifts.iter().map(move |at| (record, series.time.partition_point(|time| time < at)))
+        })
+    }
+
+    /// Places of the shifts of zeros among the [`Fit::parameters`] of a model with so many poles.
+    pub fn shift_parameters(&self, order: usize) -> Range<usize> {
+        let columns = self.columns_of_records(order);
+        columns - self.shifts().count()..columns
+    }
+
+    /// The shifts of zeros, in the reading's unit.
+    pub fn shift_sizes<'f>(&self, fit: &'f Fit) -> &'f [f64] {
+        &fit.coefficients[self.shift_parameters(fit.poles.order())]
     }
 
     /// Fits the linear coefficients.
@@ -423,6 +452,10 @@ impl Problem {
                 }
             }
         }
+        for (record, from) in self.shifts() {
+            let values = (0..paths[record].voltage.len()).map(|row| if row < from { 0.0 } else { 1.0 }).collect();
+            basis.add(self.weighted(Column { first: self.starts[record], values }));
+        }
         let all = |parts: Vec<&[f64]>| self.weighted(Column { first: 0, values: parts.concat() });
         basis.add(all(paths.iter().map(|path| path.voltage.as_slice()).collect()));
         for (index, section) in poles.sections.iter().enumerate() {
@@ -445,7 +478,7 @@ impl Problem {
         let responses = self.responses(&paths, &poles.sections);
         let mut fit = self.fitted(&paths, &responses, poles);
         let own = Self::own_columns(fit.poles.order());
-        let shared = self.series.len() * own;
+        let shared = self.columns_of_records(fit.poles.order());
         let mut column = 1;
         for (index, &section) in fit.poles.sections.iter().enumerate() {
             for which in 0..section.order() {

@@ -43,6 +43,8 @@ pub struct Series {
     /// True if the rows are equally spaced.
     pub even: bool,
     pub(super) at_rest: bool,
+    /// Times, after the record's first row, from which on all readings are shifted by a constant that is to be fitted.
+    pub(super) shifts: Vec<f64>,
     pieces: Vec<Piece>,
 }
 
@@ -78,8 +80,14 @@ impl Series {
             spacing: if evenly { step } else { spacing },
             held: input == Input::Hold,
             even: evenly,
+            shifts: Vec::new(),
             pieces,
         }
+    }
+
+    /// The series of a sensor whose zero is shifted from these times on, after the record's first row.
+    pub fn shifted(self, shifts: &[f64]) -> Self {
+        Self { shifts: shifts.to_vec(), ..self }
     }
 
     /// The series with a free response.

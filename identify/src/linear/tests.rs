@@ -251,3 +251,32 @@ fn magnitude_of_a_linear_voltage_has_its_zeros() {
     let left = problem.residual(&Fit { poles: halves, ..fit });
     near(left[1], 12.0 - 4.0, 1e-9);
 }
+
+/// Shifts of the zero by 5 from 47 s on and by -3 from 70 s on, at places that are given.
+#[test]
+fn shifts_of_the_zero_are_fitted_with_the_model() {
+    let (times, voltage) = (even_times(500, 0.25), levels(500, 20));
+    let mut record = measured(&LAG, &times, &voltage, &scaled(normals(500), 0.1));
+    for row in &mut record.rows {
+        let by = if row.time_s < 47.0 {
+            0.0
+        } else if row.time_s < 70.0 {
+            5.0
+        } else {
+            2.0
+        };
+        row.measured = row.measured.map(|reading| reading + by);
+    }
+    let problem = Problem::new(vec![Series::new(&record, Input::Hold).shifted(&[46.9, 69.9])]);
+    let fit = best_up_to(&problem, 1).last().unwrap();
+    let Section::First { tau } = fit.poles.sections[0] else { panic!("{:?}", fit.poles) };
+    near(tau, 2.0, 0.02);
+    let [first, second] = problem.shift_sizes(&fit) else { panic!() };
+    near(*first, 5.0, 0.01);
+    near(*second, -3.0, 0.02);
+    // Without noise beyond that of the readings, in all rows and in a part of them.
+    let residual = problem.residual(&fit);
+    assert!(root_mean_square(&residual) < 0.11, "{}", root_mean_square(&residual));
+    near(*problem.shift_sizes(&problem.only(|row| row % 3 > 0).fit(fit.poles.clone())).last().unwrap(), -3.0, 0.02);
+    assert!(root_mean_square(&held_out_residual(&problem, &fit)) < 0.11);
+}

@@ -22,6 +22,8 @@ const AROUND: usize = 3;
 const LINE: usize = 8;
 /// If more of the readings are far off, they are a part of the response.
 const MOST: f64 = 0.05;
+/// A change of the voltage is a jump if it is so many times as large as the usual one.
+const JUMP: f64 = 10.0;
 /// Records with fewer readings have no scale of their own.
 const FEWEST: usize = 20;
 
@@ -64,15 +66,23 @@ pub(super) fn of_errors(course: &Course, delay: f64) -> Vec<usize> {
     if far.is_empty() || far.len() as f64 > MOST * rows as f64 {
         return Vec::new();
     }
-    let (time, voltage) = (&course.time_s, &course.voltage_v);
-    let full_scale = voltage.iter().fold(0.0, |most: f64, volts| most.max(volts.abs()));
-    let mut after = vec![false; rows];
-    for (row, _) in changes(voltage, full_scale) {
-        let last = time.partition_point(|at| *at <= time[row] + delay) + ROWS_AFTER_CHANGE.count();
-        after[row..last.min(rows)].fill(true);
-    }
+    let after = after_changes(course, delay);
     let just_after = far.iter().filter(|row| after[**row]).count();
     if follow(far.len(), just_after, &after) { Vec::new() } else { far }
+}
+
+/// Returns for each reading whether the voltage has just jumped: by far more than it usually changes from row to row.
+pub(super) fn after_changes(course: &Course, delay: f64) -> Vec<bool> {
+    let (time, voltage) = (&course.time_s, &course.voltage_v);
+    let full_scale = voltage.iter().fold(0.0, |most: f64, volts| most.max(volts.abs()));
+    let mut usual: Vec<f64> = voltage.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let least = JUMP * median(&mut usual).unwrap_or(0.0);
+    let mut after = vec![false; time.len()];
+    for (row, _) in changes(voltage, full_scale).filter(|(_, change)| *change > least) {
+        let last = time.partition_point(|at| *at <= time[row] + delay) + ROWS_AFTER_CHANGE.count();
+        after[row..last.min(time.len())].fill(true);
+    }
+    after
 }
 
 /// Returns the readings whose distance from those around them is large while that of their neighbours is not.

@@ -129,6 +129,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         remarks: Vec::new(),
         left_out: Vec::new(),
         at_bound: Vec::new(),
+        zero_shifts: Vec::new(),
         unit: reading.into(),
         model: None,
     };

@@ -16,6 +16,7 @@ mod plant;
 pub mod remarks;
 pub mod report;
 mod usable;
+mod zero_shifts;
 
 pub use identified::{Course, Identified};
 pub use models::{BestLinear, best_linear};
@@ -30,9 +31,9 @@ use simulation::units::Units;
 
 use crate::linear::{Problem, Series, best_up_to};
 use crate::nominal::identified::described;
-use crate::nominal::models::Models;
+use crate::nominal::models::{Models, WORTHWHILE};
 use crate::nominal::plant::VoltageRange;
-use crate::nominal::report::{AtBound, FarReading, InputLaw};
+use crate::nominal::report::{AtBound, FarReading, InputLaw, ZeroShift};
 use crate::nominal::usable::check;
 use crate::record::bounds::Bounds;
 use crate::record::input::Input;
@@ -58,20 +59,48 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();
     leave_out(&mut kept, far, &mut left_out);
-    let mut identified = of_all(&kept, input, units);
+    let mut shifts = vec![Vec::new(); records.len()];
+    let (mut identified, mut models) = of_all(&kept, &shifts, input, units);
     for _ in 1..MOST_SEARCHES {
         let delay = identified.report.nominal.delay_s.value;
         let far = identified.records.iter().map(|course| far_readings::of_errors(course, delay)).collect();
         if !leave_out(&mut kept, far, &mut left_out) {
             break;
         }
-        identified = of_all(&kept, input, units);
+        (identified, models) = of_all(&kept, &shifts, input, units);
+    }
+    // One edge of a stretch shows nothing as long as the other is missing, so that a better model is followed further.
+    let mut latest: Option<(Identified, Models)> = None;
+    for _ in 0..zero_shifts::MOST {
+        let before = latest.as_ref().map_or((&identified, &models), |(identified, models)| (identified, models));
+        let delay = before.0.report.nominal.delay_s.value;
+        let further: Vec<Vec<f64>> = before.0.records.iter().map(|course| zero_shifts::steps(course, delay)).collect();
+        if further.iter().all(Vec::is_empty) {
+            break;
+        }
+        shifts.iter_mut().zip(further).for_each(|(known, further)| known.extend(further));
+        let with = of_all(&kept, &shifts, input, units);
+        if with.1.held_out_rmse() > (1.0 - WORTHWHILE) * before.1.held_out_rmse() {
+            break;
+        }
+        if zero_shifts::are_shown(&with.1, &models) {
+            (identified, models) = with;
+            latest = None;
+        } else {
+            latest = Some(with);
+        }
     }
     if !left_out.is_empty() {
         left_out.sort_by(|a, b| a.record.cmp(&b.record).then(a.time_s.total_cmp(&b.time_s)));
         identified.linear = None;
         identified.report.remarks.insert(0, remarks::left_out(&left_out, units));
         identified.report.left_out = left_out;
+    }
+    if !identified.report.zero_shifts.is_empty() {
+        identified.linear = None;
+        let shifts = &mut identified.report.zero_shifts;
+        shifts.sort_by(|a, b| a.record.cmp(&b.record).then(a.from_s.total_cmp(&b.from_s)));
+        identified.report.remarks.insert(0, remarks::zero_shifts(&identified.report.zero_shifts, units));
     }
     if !stopped.is_empty() {
         identified.linear = None;
@@ -134,9 +163,14 @@ fn leave_out(records: &mut Cow<[Record]>, far: Vec<Vec<usize>>, left_out: &mut V
     true
 }
 
-/// Identifies the spring of records that were checked, from all of their readings.
-fn of_all(records: &[Record], input: Input, units: &Units) -> Identified {
-    let series: Vec<Series> = records.iter().map(|record| Series::new(record, input)).collect();
+/// Identifies the spring of records that were checked, from all of their readings, with shifts of each record's zero from some times on,
+/// in s.
+fn of_all(records: &[Record], shifts: &[Vec<f64>], input: Input, units: &Units) -> (Identified, Models) {
+    let shifted = |(record, shifts): (&Record, &Vec<f64>)| {
+        let after_first = |at: &f64| at - record.rows[0].time_s;
+        Series::new(record, input).shifted(&shifts.iter().map(after_first).collect::<Vec<f64>>())
+    };
+    let series: Vec<Series> = records.iter().zip(shifts).map(shifted).collect();
     let mut models = Models::of(series.clone(), InputLaw::Linear);
     let linear = models.best();
     let both_signs = series.iter().any(Series::has_both_signs);
@@ -158,7 +192,12 @@ fn of_all(records: &[Record], input: Input, units: &Units) -> Identified {
         }
     }
     let voltage = VoltageRange { full_scale_v: full_scale, both_signs };
-    Identified { linear, ..described(records, &models, voltage, units) }
+    let mut identified = Identified { linear, ..described(records, &models, voltage, units) };
+    let names = records.iter().zip(shifts).flat_map(|(record, shifts)| shifts.iter().map(|at| (&record.name, *at)));
+    let sizes = models.problem.shift_sizes(models.best_fit());
+    let shift = |((record, from_s), &by): ((&String, f64), &f64)| ZeroShift { record: record.clone(), from_s, by };
+    identified.report.zero_shifts = names.zip(sizes).map(shift).collect();
+    (identified, models)
 }
 
 #[cfg(test)]

@@ -161,7 +161,7 @@ fn beats(problem: &Problem, large: &Model, small: &Model) -> bool {
 }
 
 /// Number of independent errors with the same information on a mean.
-fn effective_rows(problem: &Problem, errors: &[f64]) -> f64 {
+pub(super) fn effective_rows(problem: &Problem, errors: &[f64]) -> f64 {
     let Spectrum { ar, innovations } = Spectrum::of(errors, problem.starts(), &[]);
     let effective = dot(errors, errors) * (1.0 - ar.iter().sum::<f64>()).powi(2) / innovations;
     effective.min(errors.len() as f64)

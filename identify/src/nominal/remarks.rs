@@ -7,7 +7,7 @@ use simulation::units::Units;
 use crate::dimension::significant;
 use crate::linear::{Fit, Problem, Section};
 use crate::nominal::models::STRUCTURED;
-use crate::nominal::report::{AtBound, FarReading, InputLaw, Report};
+use crate::nominal::report::{AtBound, FarReading, InputLaw, Report, ZeroShift};
 
 /// A time constant with a larger ratio of its bounds is hardly known.
 const HARDLY_KNOWN: f64 = 4.0;
@@ -29,6 +29,20 @@ pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
         times.join(", "),
         if readings.len() > LISTED { ", ..." } else { "" },
         units.time.name
+    )
+}
+
+/// The remark on shifts of the sensor's zero.
+pub(super) fn zero_shifts(shifts: &[ZeroShift], units: &Units) -> String {
+    let shown = |ZeroShift { from_s, by, .. }: &ZeroShift| {
+        let time = significant(from_s / units.time.si, 6);
+        format!("by {} {} from {time} {} on", significant(*by, 4), units.reading, units.time.name)
+    };
+    let all: Vec<String> = shifts.iter().map(shown).collect();
+    format!(
+        "The readings are shifted {}, abruptly and not by the voltage: the shift was fitted together with the model; `vsj diagnose` judges \
+         all readings.",
+        all.join(", ")
     )
 }
 

@@ -99,6 +99,17 @@ pub struct AtBound {
     pub readings: usize,
 }
 
+/// A shift of the sensor's zero, that was fitted together with the model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ZeroShift {
+    /// Name of the record.
+    pub record: String,
+    /// Time in the record from which on the readings are shifted, in s.
+    pub from_s: f64,
+    /// The shift of the readings from there on, in their unit.
+    pub by: f64,
+}
+
 /// What of the voltage the spring responds to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -146,6 +157,8 @@ pub struct Report {
     pub left_out: Vec<FarReading>,
     /// The readings that were left out because they stopped at a bound.
     pub at_bound: Vec<AtBound>,
+    /// The shifts of the sensor's zero that were fitted together with the model.
+    pub zero_shifts: Vec<ZeroShift>,
     /// What the records cannot tell, one sentence each.
     pub remarks: Vec<String>,
     /// Name of the reading's unit.

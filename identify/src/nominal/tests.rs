@@ -98,6 +98,32 @@ fn readings_at_a_bound_of_the_sensor_are_left_out() {
     assert!(expected.at_bound.is_empty() && expected.rows == 600);
 }
 
+/// A model of higher order would follow the step with a slow time constant of its own.
+#[test]
+fn a_shift_of_the_zero_is_fitted_with_the_model_and_spoils_nothing() {
+    let clean = record(800, 3000, 0.0, 0.5);
+    let expected = found(std::slice::from_ref(&clean)).report;
+    assert!(expected.zero_shifts.is_empty());
+    let near = |of: &Report| [of.nominal.gain.value / 0.5, of.nominal.tau_s[0].tau.value / 4.0];
+    // In a stretch, and to the end.
+    for (rows, edges) in [(257..431, vec![(257, 8.0), (431, -8.0)]), (311..800, vec![(311, 8.0)])] {
+        let mut shifted = clean.clone();
+        shifted.rows[rows].iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + 8.0));
+        let report = found(std::slice::from_ref(&shifted)).report;
+        assert_eq!(report.order, expected.order, "{report:?}");
+        assert!(near(&report).iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{:?}", near(&report));
+        let by: Vec<f64> = report.zero_shifts.iter().map(|shift| shift.by).collect();
+        assert_eq!(by.len(), edges.len(), "{:?}", report.zero_shifts);
+        for ((row, size), shift) in edges.iter().zip(&report.zero_shifts) {
+            assert!((shift.by - size).abs() < 1.0, "{shift:?}");
+            assert!((shift.from_s - shifted.rows[*row].time_s).abs() < 1.0, "{shift:?}");
+        }
+        assert!(report.remarks[0].contains("are shifted by"), "{:?}", report.remarks);
+        // Of all rows.
+        assert!((report.rmse / expected.rmse - 1.0).abs() < 0.05, "{} {}", report.rmse, expected.rmse);
+    }
+}
+
 /// Least squares would let a delay, a quick time constant or an oscillation follow such readings, and widen the intervals.
 #[test]
 fn readings_that_no_spring_made_are_left_out() {

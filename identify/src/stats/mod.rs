@@ -13,5 +13,6 @@ pub mod median;
 pub mod periodogram;
 pub mod scale;
 pub(crate) mod segments;
+pub(crate) mod shifted_run;
 pub mod sums;
 pub mod thresholds;
