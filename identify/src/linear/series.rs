@@ -86,8 +86,8 @@ impl Series {
     }
 
     /// The series of a sensor whose zero is shifted from these times on, after the record's first row.
-    pub fn shifted(self, shifts: &[f64]) -> Self {
-        Self { shifts: shifts.to_vec(), ..self }
+    pub fn shifted(self, shifts: Vec<f64>) -> Self {
+        Self { shifts, ..self }
     }
 
     /// The series with a free response.

@@ -267,7 +267,7 @@ fn shifts_of_the_zero_are_fitted_with_the_model() {
         };
         row.measured = row.measured.map(|reading| reading + by);
     }
-    let problem = Problem::new(vec![Series::new(&record, Input::Hold).shifted(&[46.9, 69.9])]);
+    let problem = Problem::new(vec![Series::new(&record, Input::Hold).shifted(vec![46.9, 69.9])]);
     let fit = best_up_to(&problem, 1).last().unwrap();
     let Section::First { tau } = fit.poles.sections[0] else { panic!("{:?}", fit.poles) };
     near(tau, 2.0, 0.02);

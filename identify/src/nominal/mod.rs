@@ -44,7 +44,7 @@ const MOST_OF_SQUARE: f64 = 0.5;
 const MOST_SEARCHES: usize = 3;
 
 /// Identifies the spring of one or several records; each has its own zero and start. Readings that stopped at a bound of the sensor, and
-/// those that are far from all around them, are left out.
+/// those that are far from all around them, are left out; shifts of a zero within a record are fitted with the spring.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
@@ -59,37 +59,16 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();
     leave_out(&mut kept, far, &mut left_out);
-    let mut shifts = vec![Vec::new(); records.len()];
-    let (mut identified, mut models) = of_all(&kept, &shifts, input, units);
+    let (mut identified, mut models) = of_all(&kept, &[], input, units);
     for _ in 1..MOST_SEARCHES {
         let delay = identified.report.nominal.delay_s.value;
         let far = identified.records.iter().map(|course| far_readings::of_errors(course, delay)).collect();
         if !leave_out(&mut kept, far, &mut left_out) {
             break;
         }
-        (identified, models) = of_all(&kept, &shifts, input, units);
+        (identified, models) = of_all(&kept, &[], input, units);
     }
-    // One edge of a stretch shows nothing as long as the other is missing, so that a better model is followed further.
-    let mut latest: Option<(Identified, Models)> = None;
-    for _ in 0..zero_shifts::MOST {
-        let before = latest.as_ref().map_or((&identified, &models), |(identified, models)| (identified, models));
-        let delay = before.0.report.nominal.delay_s.value;
-        let further: Vec<Vec<f64>> = before.0.records.iter().map(|course| zero_shifts::steps(course, delay)).collect();
-        if further.iter().all(Vec::is_empty) {
-            break;
-        }
-        shifts.iter_mut().zip(further).for_each(|(known, further)| known.extend(further));
-        let with = of_all(&kept, &shifts, input, units);
-        if with.1.held_out_rmse() > (1.0 - WORTHWHILE) * before.1.held_out_rmse() {
-            break;
-        }
-        if zero_shifts::are_shown(&with.1, &models) {
-            (identified, models) = with;
-            latest = None;
-        } else {
-            latest = Some(with);
-        }
-    }
+    let mut identified = with_zero_shifts(&kept, identified, models, input, units);
     if !left_out.is_empty() {
         left_out.sort_by(|a, b| a.record.cmp(&b.record).then(a.time_s.total_cmp(&b.time_s)));
         identified.linear = None;
@@ -108,6 +87,39 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         identified.report.at_bound = stopped;
     }
     Ok(identified)
+}
+
+/// Returns the spring of records as it is with the shifts of their zeros that the records show, from the one without any.
+fn with_zero_shifts(
+    records: &[Record],
+    mut identified: Identified,
+    mut models: Models,
+    input: Input,
+    units: &Units,
+) -> Identified {
+    let mut shifts = vec![Vec::new(); records.len()];
+    // One edge of a stretch shows nothing as long as the other is missing, so that a better model is followed further.
+    let mut latest: Option<(Identified, Models)> = None;
+    for _ in 0..zero_shifts::MOST_SEARCHES {
+        let (spring, before) = latest.as_ref().map_or((&identified, &models), |latest| (&latest.0, &latest.1));
+        let delay = spring.report.nominal.delay_s.value;
+        let further: Vec<Vec<f64>> = spring.records.iter().map(|course| zero_shifts::steps(course, delay)).collect();
+        if further.iter().all(Vec::is_empty) {
+            break;
+        }
+        shifts.iter_mut().zip(further).for_each(|(known, further)| known.extend(further));
+        let with = of_all(records, &shifts, input, units);
+        if with.1.held_out_rmse() > (1.0 - WORTHWHILE) * before.held_out_rmse() {
+            break;
+        }
+        if zero_shifts::are_shown(&with.1, &models) {
+            (identified, models) = with;
+            latest = None;
+        } else {
+            latest = Some(with);
+        }
+    }
+    identified
 }
 
 /// Takes the readings that stopped at a bound of the sensor out of each record, and lists them; all stay in a record that could not be
@@ -164,13 +176,13 @@ fn leave_out(records: &mut Cow<[Record]>, far: Vec<Vec<usize>>, left_out: &mut V
 }
 
 /// Identifies the spring of records that were checked, from all of their readings, with shifts of each record's zero from some times on,
-/// in s.
+/// in s; without any if there are no lists of them.
 fn of_all(records: &[Record], shifts: &[Vec<f64>], input: Input, units: &Units) -> (Identified, Models) {
-    let shifted = |(record, shifts): (&Record, &Vec<f64>)| {
-        let after_first = |at: &f64| at - record.rows[0].time_s;
-        Series::new(record, input).shifted(&shifts.iter().map(after_first).collect::<Vec<f64>>())
+    let shifted = |(index, record): (usize, &Record)| {
+        let after_first = shifts.get(index).into_iter().flatten().map(|at| at - record.rows[0].time_s);
+        Series::new(record, input).shifted(after_first.collect())
     };
-    let series: Vec<Series> = records.iter().zip(shifts).map(shifted).collect();
+    let series: Vec<Series> = records.iter().enumerate().map(shifted).collect();
     let mut models = Models::of(series.clone(), InputLaw::Linear);
     let linear = models.best();
     let both_signs = series.iter().any(Series::has_both_signs);

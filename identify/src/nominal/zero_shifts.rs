@@ -10,13 +10,13 @@ use crate::nominal::identified::Course;
 use crate::nominal::intervals::directions;
 use crate::nominal::models::{Models, effective_rows};
 use crate::stats::median::{median, robust_deviation};
-use crate::stats::scale::{robust_scale, root_mean_square, second_differences};
+use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::shifted_run::shifted_run;
 use crate::stats::thresholds::empirical::PRICE_OF_RUN;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 
-/// Most stretches of shifted readings in a record.
-pub(super) const MOST: usize = 3;
+/// Most searches for a model with further shifts.
+pub(super) const MOST_SEARCHES: usize = 3;
 /// A shift is no chance, at the best of all places, if it is as many of its standard deviations.
 const SIGNIFICANT: f64 = 6.0;
 
@@ -29,7 +29,8 @@ const OTHER_EDGE: f64 = 0.5;
 
 /// Returns the times between readings at which the errors of a record step, in s; none if they do not, or as the voltage changes.
 pub(super) fn steps(course: &Course, delay: f64) -> Vec<f64> {
-    let Some(run) = shifted_run(&course.residual, robust_scale(&course.residual)) else { return Vec::new() };
+    let usual = robust_deviation(course.residual.iter().copied()).unwrap_or(0.0);
+    let Some(run) = shifted_run(&course.residual, usual) else { return Vec::new() };
     let rows = course.residual.len();
     let mut edges: Vec<(usize, f64)> = [run.from, run.to]
         .into_iter()

@@ -60,7 +60,12 @@ impl Validated<'_, Margin> {
 }
 
 impl<E: Estimator> Robust<E> {
-    pub(crate) fn voltage(&self, _: &mut State<E::State>, _: Aim, _: Option<(&feedback::Config, Observed)>) -> Volts {
+    pub(crate) fn voltage(
+        &self,
+        _: &mut State<E::State>,
+        _: Aim,
+        _: Option<(&feedback::Config, &feedback::State, Observed)>,
+    ) -> Volts {
         match self.never {}
     }
 

@@ -204,7 +204,9 @@ mod tests {
             observed
         };
         let (mut state, mut ticks) = (State::default(), 1..2000);
-        ticks.by_ref().take(500).for_each(|number| drop(tick(&mut state, number, Some(0.0))));
+        for number in ticks.by_ref().take(500) {
+            tick(&mut state, number, Some(0.0));
+        }
         let number = ticks.next().unwrap();
         assert_eq!(tick(&mut state, number, ahead), Observed::Reading, "one ahead");
         let (mut next, number) = (state, ticks.next().unwrap());
