@@ -15,7 +15,8 @@ use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
 use crate::record::data::Data;
 use crate::record::spectrum;
-use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LEAST_PART_OF_STEP, SHORTEST_RUN};
+use crate::stats::shifted_run::autocorrelation;
+use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, FEWEST_PERIODS, LEAST_PART_OF_STEP, SHORTEST_RUN};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
 pub(super) struct Drift;
@@ -77,23 +78,37 @@ fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) ->
 }
 
 /// Returns the row from which on a factor other than 1 reduces the squared error most, and the factor less 1; NaN rows do not count.
-fn best_step(FitContext { data, residual, .. }: &FitContext) -> Option<Vec<f64>> {
+///
+/// Errors that wander are whitened by their autocorrelation `phi`, as those of a [shifted run](crate::stats::shifted_run): the step's own
+/// row counts with the whole reading, the rows behind it with what their reading changes.
+fn best_step(FitContext { data, residual, sigma }: &FitContext) -> Option<Vec<f64>> {
     let least = LEAST_PART_OF_STEP.get();
-    let (mut product, mut square) = (0.0, 0.0);
-    let seen = data.reading.iter().zip(*residual).filter(|(_, left)| !left.is_nan());
-    let all: f64 = seen.map(|(reading, _)| reading * reading).sum();
-    let mut best: Option<(f64, f64, f64)> = None;
+    let seen = |row: usize| !residual[row].is_nan();
+    let bound = CLIP_FOR_RUN.get() * sigma;
     let rows = residual.len();
+    let clipped: Vec<f64> = (0..rows).filter(|&row| seen(row)).map(|row| residual[row].clamp(-bound, bound)).collect();
+    let phi = autocorrelation(&clipped);
+    let (mut product, mut square, mut power) = (0.0, 0.0, 0.0);
+    let all: f64 = (0..rows).filter(|&row| seen(row)).map(|row| data.reading[row].powi(2)).sum();
+    let mut best: Option<(f64, f64, f64)> = None;
     for row in (1..rows).rev() {
-        if !residual[row].is_nan() {
-            product += residual[row] * data.reading[row];
-            square += data.reading[row] * data.reading[row];
+        let whitened = |of: &[f64]| of[row] - phi * of[row - 1];
+        let (mut here, mut size) = (0.0, 0.0);
+        if seen(row) && (phi == 0.0 || seen(row - 1)) {
+            let left = whitened(residual);
+            (here, size) = (left * data.reading[row], data.reading[row].powi(2));
+            power += size;
+            let long = rows - row >= SHORTEST_RUN.count() && row >= SHORTEST_RUN.count();
+            let both = (least * all..=(1.0 - least) * all).contains(&power);
+            let (product, square) = (product + here, square + size);
+            if long && both && square > 0.0 && best.is_none_or(|(gain, ..)| product * product / square > gain) {
+                best = Some((product * product / square, row as f64, product / square));
+            }
+            let change = whitened(&data.reading);
+            (here, size) = (left * change, change * change);
         }
-        let long = rows - row >= SHORTEST_RUN.count() && row >= SHORTEST_RUN.count();
-        let both = (least * all..=(1.0 - least) * all).contains(&square);
-        if long && both && square > 0.0 && best.is_none_or(|(gain, ..)| product * product / square > gain) {
-            best = Some((product * product / square, row as f64, product / square));
-        }
+        product += here;
+        square += size;
     }
     best.map(|(_, row, change)| vec![row, change])
 }

@@ -12,7 +12,7 @@ use crate::effects::offset_levels::{Stretch, stretches};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
-use crate::stats::shifted_run::{ShiftedRun, shifted_run};
+use crate::stats::shifted_run::{ShiftedRun, shifted_runs};
 use crate::stats::thresholds::empirical::{PRICE_OF_RUN, ROWS_FOR_ZERO};
 use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_ZERO};
 
@@ -71,10 +71,10 @@ fn shows_at_rest(data: &Data) -> bool {
     zero.abs() > Z_ZERO * error
 }
 
-/// Returns the point of the run whose shift explains most.
-fn best_run(context: &FitContext) -> Option<Vec<f64>> {
-    let ShiftedRun { from, to, shift } = shifted_run(context.residual, context.sigma)?;
-    Some(vec![from as f64, to as f64, shift])
+/// Returns the points of the runs whose shifts explain most.
+fn best_runs(context: &FitContext) -> impl Iterator<Item = Vec<f64>> {
+    let point = |ShiftedRun { from, to, shift }| vec![from as f64, to as f64, shift];
+    shifted_runs(context.residual, context.sigma).into_iter().map(point)
 }
 
 impl Effect for ReadingOffset {
@@ -120,13 +120,16 @@ impl Effect for ReadingOffset {
 
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
-            RUN => best_run(context).into_iter().collect(),
+            RUN => best_runs(context).collect(),
             LEVELS => {
                 let found = stretches(context.residual, MOST_STRETCHES);
                 let several = (found.len() >= FEWEST_STRETCHES).then(|| levels(context.data.rows(), &found));
                 several.into_iter().collect()
             }
-            _ if shows_at_rest(context.data) => vec![vec![-context.sigma], vec![context.sigma]],
+            // The zero of an identified spring is estimated with every set of causes.
+            _ if !context.data.normalisation.identified && shows_at_rest(context.data) => {
+                vec![vec![-context.sigma], vec![context.sigma]]
+            }
             _ => Vec::new(),
         }
     }
@@ -165,7 +168,12 @@ impl Effect for ReadingOffset {
     fn refine_searched(&self, form: usize, point: &mut [f64], context: &FitContext) {
         if form == LEVELS {
             point.copy_from_slice(&levels(context.data.rows(), &stretches(context.residual, MOST_STRETCHES)));
-        } else if let Some(best) = best_run(context) {
+            return;
+        }
+        // By level or by edges, as the start that it came from.
+        let distance = |run: &Vec<f64>| (run[0] - point[0]).abs() + (run[1] - point[1]).abs();
+        let nearest = best_runs(context).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(best) = nearest {
             point.copy_from_slice(&best);
         }
     }

@@ -375,6 +375,17 @@ impl Problem {
         columns - self.shifts().count()..columns
     }
 
+    /// The rows of all records that each shift of a zero shifts.
+    pub fn shift_rows(&self) -> impl Iterator<Item = Range<usize>> {
+        let end = |record: usize| self.starts[record] + self.series[record].rows();
+        self.shifts().map(move |(record, from)| self.starts[record] + from..end(record))
+    }
+
+    /// The model at each row, less the mean of each record's readings.
+    pub fn response(&self, fit: &Fit) -> Vec<f64> {
+        self.readings.values.iter().zip(self.residual(fit)).map(|(reading, left)| reading - left).collect()
+    }
+
     /// The shifts of zeros, in the reading's unit.
     pub fn shift_sizes<'f>(&self, fit: &'f Fit) -> &'f [f64] {
         &fit.coefficients[self.shift_parameters(fit.poles.order())]

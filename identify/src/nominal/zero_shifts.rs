@@ -4,6 +4,7 @@
 //! A linear model follows such a step with a slow time constant of its own, which hides the step and spoils all other parameters. So the
 //! places of steps are taken from the errors of the best model, and their sizes are fitted together with it.
 
+use crate::linear::{Fit, Problem};
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::far_readings::after_changes;
 use crate::nominal::identified::Course;
@@ -11,9 +12,10 @@ use crate::nominal::intervals::directions;
 use crate::nominal::models::{Models, effective_rows};
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::{root_mean_square, second_differences};
-use crate::stats::shifted_run::shifted_run;
+use crate::stats::shifted_run::shifted_runs;
+use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::PRICE_OF_RUN;
-use crate::stats::thresholds::probability::RIVAL_ODDS;
+use crate::stats::thresholds::probability::{RIVAL_ODDS, Z_RARE};
 
 /// Most searches for a model with further shifts.
 pub(super) const MOST_SEARCHES: usize = 3;
@@ -30,7 +32,7 @@ const OTHER_EDGE: f64 = 0.5;
 /// Returns the times between readings at which the errors of a record step, in s; none if they do not, or as the voltage changes.
 pub(super) fn steps(course: &Course, delay: f64) -> Vec<f64> {
     let usual = robust_deviation(course.residual.iter().copied()).unwrap_or(0.0);
-    let Some(run) = shifted_run(&course.residual, usual) else { return Vec::new() };
+    let Some(run) = shifted_runs(&course.residual, usual).pop() else { return Vec::new() };
     let rows = course.residual.len();
     let mut edges: Vec<(usize, f64)> = [run.from, run.to]
         .into_iter()
@@ -56,8 +58,8 @@ fn jump(errors: &[f64], edge: usize) -> f64 {
     after - before
 }
 
-/// True if models with further shifts are better than those without by more than the search for their places may gain, and each of their
-/// shifts is larger than its error.
+/// True if models with further shifts are better than those without by more than the search for their places may gain, each of their
+/// shifts is larger than its error, and the gain does not change with the zero.
 pub(super) fn are_shown(with: &Models, without: &Models) -> bool {
     let [held_out, before] = [with, without].map(|models| &models.fits[models.chosen].held_out);
     let fit = with.best_fit();
@@ -71,9 +73,26 @@ pub(super) fn are_shown(with: &Models, without: &Models) -> bool {
     let fit = with.problem.linearised(fit.poles.clone());
     let spectrum = Spectrum::of(&fit.residual, with.problem.starts(), &directions(&with.problem, &fit));
     let parameters = fit.parameters(&with.problem);
-    shifts.into_iter().all(|at| {
+    let mut significant = shifts.into_iter().map(|at| {
         let mut unit = vec![0.0; parameters.len()];
         unit[at] = 1.0;
         parameters[at].abs() > SIGNIFICANT * spectrum.deviation(&fit.influence(&unit))
+    });
+    significant.all(|significant| significant) && !changes_gain(&with.problem, &fit, &spectrum)
+}
+
+/// True if the errors of a linearised fit follow the response itself from a shift of the zero on: then the gain has changed.
+fn changes_gain(problem: &Problem, fit: &Fit, spectrum: &Spectrum) -> bool {
+    let (directions, response) = (fit.directions(), problem.response(fit));
+    problem.shift_rows().any(|rows| {
+        let mut column = vec![0.0; response.len()];
+        column[rows.clone()].copy_from_slice(&response[rows]);
+        for direction in &directions {
+            let part = dot(direction, &column);
+            column.iter_mut().zip(direction).for_each(|(value, along)| *value -= part * along);
+        }
+        let power = dot(&column, &column);
+        let influence: Vec<f64> = column.iter().map(|value| value / power).collect();
+        power > 0.0 && dot(&influence, &fit.residual).abs() > Z_RARE * spectrum.deviation(&influence)
     })
 }

@@ -118,38 +118,49 @@ impl Whitened {
     }
 }
 
-/// Returns the run whose shift explains most of some errors, NaN in the rows that count neither for nor against it, with noise of the scale
-/// `sigma`, in V; `None` if no run is shifted by more than chance.
-pub(crate) fn shifted_run(errors: &[f64], sigma: f64) -> Option<ShiftedRun> {
+/// Returns the run whose shift explains most of some errors by its level, and the one that does by its edges where the errors wander. Rows
+/// with NaN count neither for nor against a run; `sigma` is the scale of the noise, in V. None if no run is shifted by more than chance.
+pub(crate) fn shifted_runs(errors: &[f64], sigma: f64) -> Vec<ShiftedRun> {
     let bound = CLIP_FOR_RUN.get() * sigma;
     let rows: Vec<usize> = (0..errors.len()).filter(|&row| !errors[row].is_nan()).collect();
     let clipped: Vec<f64> = rows.iter().map(|&row| errors[row].clamp(-bound, bound)).collect();
     if clipped.len() < 2 * SHORTEST_RUN.count() {
-        return None;
+        return Vec::new();
     }
+    let seen: Vec<f64> = rows.iter().map(|&row| errors[row]).collect();
     let phi = autocorrelation(&clipped);
-    // The edges that a single far reading has are none of a run.
-    let smooth = (phi > 0.0).then(|| running_median(&clipped));
-    let whitened = Whitened::new(smooth.as_ref().unwrap_or(&clipped), &rows, phi);
-    let (first, end) = whitened.best()?;
-    let mut seen: Vec<f64> = rows[first..end].iter().map(|&row| errors[row]).collect();
-    let (shift, significant) = if phi > 0.0 {
-        let (shift, gain) = whitened.best_shift(first, end);
-        let noise = robust_deviation(whitened.left.iter().copied())?;
-        (shift, gain.sqrt() > Z_RARE * noise)
-    } else {
-        // In a burst of stronger noise the mean of a run is far from 0 by chance.
-        let noise = robust_deviation(second_differences(&seen)).unwrap_or(0.0);
-        // The median is not affected by an outlier in the run.
-        let shift = median(&mut seen)?;
-        (shift, shift.abs() * (seen.len() as f64).sqrt() > Z_RARE * noise)
+    let by_edges = if phi > 0.0 { by_edges(&clipped, &rows, phi) } else { None };
+    let in_all_rows = |run: ShiftedRun| ShiftedRun {
+        from: if run.from == 0 { 0 } else { rows[run.from] },
+        to: rows.get(run.to).copied().unwrap_or(errors.len()),
+        ..run
     };
-    let to = rows.get(end).copied().unwrap_or(errors.len());
-    significant.then_some(ShiftedRun { from: if first == 0 { 0 } else { rows[first] }, to, shift })
+    by_level(&seen, &clipped, &rows).into_iter().chain(by_edges).map(in_all_rows).collect()
+}
+
+/// Returns the run that explains most by its level, among the errors of the rows that are seen.
+fn by_level(seen: &[f64], clipped: &[f64], rows: &[usize]) -> Option<ShiftedRun> {
+    let (from, to) = Whitened::new(clipped, rows, 0.0).best()?;
+    let mut seen = seen[from..to].to_vec();
+    // In a burst of stronger noise the mean of a run is far from 0 by chance.
+    let noise = robust_deviation(second_differences(&seen)).unwrap_or(0.0);
+    // The median is not affected by an outlier in the run.
+    let shift = median(&mut seen)?;
+    (shift.abs() * (seen.len() as f64).sqrt() > Z_RARE * noise).then_some(ShiftedRun { from, to, shift })
+}
+
+/// Returns the run that explains most of errors with the autocorrelation `phi`.
+fn by_edges(clipped: &[f64], rows: &[usize], phi: f64) -> Option<ShiftedRun> {
+    // The edges that a single far reading has are none of a run.
+    let whitened = Whitened::new(&running_median(clipped), rows, phi);
+    let (from, to) = whitened.best()?;
+    let (shift, gain) = whitened.best_shift(from, to);
+    let noise = robust_deviation(whitened.left.iter().copied())?;
+    (gain.sqrt() > Z_RARE * noise).then_some(ShiftedRun { from, to, shift })
 }
 
 /// Returns the autocorrelation of errors from one row to the next, by robust scales; 0 if it may be none.
-fn autocorrelation(errors: &[f64]) -> f64 {
+pub(crate) fn autocorrelation(errors: &[f64]) -> f64 {
     let scale = robust_deviation(errors.iter().copied()).unwrap_or(0.0);
     let change = robust_deviation(errors.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
     let phi = 1.0 - 0.5 * (change / scale).powi(2);
@@ -167,13 +178,13 @@ mod tests {
         normals(2000).into_iter().enumerate().map(|(row, noise)| noise + slow(row) + shift(row)).collect()
     }
 
-    fn found(errors: &[f64]) -> Option<ShiftedRun> {
-        shifted_run(errors, robust_scale(errors))
+    fn found(errors: &[f64]) -> ShiftedRun {
+        shifted_runs(errors, robust_scale(errors)).pop().expect("a run")
     }
 
     #[test]
     fn a_run_among_independent_errors_is_found_by_its_level() {
-        let ShiftedRun { from, to, shift } = found(&shifted(|_| 0.0)).unwrap();
+        let ShiftedRun { from, to, shift } = found(&shifted(|_| 0.0));
         assert!(from.abs_diff(700) <= 2 && to.abs_diff(900) <= 2 && (shift - 4.0).abs() < 0.3, "{from} {to} {shift}");
     }
 
@@ -182,12 +193,12 @@ mod tests {
     fn a_run_among_slow_errors_is_found_by_its_edges() {
         let wave = |row: usize| 20.0 * (row as f64 / 200.0).sin();
         let mut errors = shifted(wave);
-        let ShiftedRun { from, to, shift } = found(&errors).unwrap();
+        let ShiftedRun { from, to, shift } = found(&errors);
         assert!(from.abs_diff(700) <= 3 && to.abs_diff(900) <= 3 && (1.0..5.0).contains(&shift), "{from} {to} {shift}");
         // Far readings have edges of their own, and some rows are not seen.
         (0..2000).step_by(97).for_each(|row| errors[row] += 30.0);
         errors[400..500].fill(f64::NAN);
-        let again = found(&errors).unwrap();
+        let again = found(&errors);
         assert!(again.from.abs_diff(700) <= 3 && again.to.abs_diff(900) <= 3, "{again:?}");
     }
 
@@ -196,7 +207,7 @@ mod tests {
         let errors: Vec<f64> = (normals(1000).into_iter().enumerate())
             .map(|(row, noise)| noise + 20.0 * (row as f64 / 150.0).sin() + if row < 630 { 0.0 } else { 8.0 })
             .collect();
-        let ShiftedRun { from, to, shift } = found(&errors).unwrap();
+        let ShiftedRun { from, to, shift } = found(&errors);
         assert!(from.abs_diff(630) <= 3 && to == 1000 && (2.0..9.0).contains(&shift), "{from} {to} {shift}");
     }
 }
