@@ -71,10 +71,10 @@ fn shows_at_rest(data: &Data) -> bool {
     zero.abs() > Z_ZERO * error
 }
 
-/// Returns the points of the runs whose shifts explain most.
-fn best_runs(context: &FitContext) -> impl Iterator<Item = Vec<f64>> {
+/// Returns the points of the runs whose shifts explain most, by level and by edges.
+fn best_runs(context: &FitContext) -> [Option<Vec<f64>>; 2] {
     let point = |ShiftedRun { from, to, shift }| vec![from as f64, to as f64, shift];
-    shifted_runs(context.residual, context.sigma).into_iter().map(point)
+    shifted_runs(context.residual, context.sigma).map(|run| run.map(point))
 }
 
 impl Effect for ReadingOffset {
@@ -120,7 +120,7 @@ impl Effect for ReadingOffset {
 
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
         match form {
-            RUN => best_runs(context).collect(),
+            RUN => best_runs(context).into_iter().flatten().collect(),
             LEVELS => {
                 let found = stretches(context.residual, MOST_STRETCHES);
                 let several = (found.len() >= FEWEST_STRETCHES).then(|| levels(context.data.rows(), &found));
@@ -170,9 +170,11 @@ impl Effect for ReadingOffset {
             point.copy_from_slice(&levels(context.data.rows(), &stretches(context.residual, MOST_STRETCHES)));
             return;
         }
-        // By level or by edges, as the start that it came from.
+        let [by_level, by_edges] = best_runs(context);
+        // A run that was placed by its edges stays near them.
+        let by_edges = by_edges.filter(|run| run[0] < point[1] && point[0] < run[1]);
         let distance = |run: &Vec<f64>| (run[0] - point[0]).abs() + (run[1] - point[1]).abs();
-        let nearest = best_runs(context).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = by_level.into_iter().chain(by_edges).min_by(|a, b| distance(a).total_cmp(&distance(b)));
         if let Some(best) = nearest {
             point.copy_from_slice(&best);
         }

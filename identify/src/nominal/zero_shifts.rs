@@ -32,7 +32,8 @@ const OTHER_EDGE: f64 = 0.5;
 /// Returns the times between readings at which the errors of a record step, in s; none if they do not, or as the voltage changes.
 pub(super) fn steps(course: &Course, delay: f64) -> Vec<f64> {
     let usual = robust_deviation(course.residual.iter().copied()).unwrap_or(0.0);
-    let Some(run) = shifted_runs(&course.residual, usual).pop() else { return Vec::new() };
+    let [by_level, by_edges] = shifted_runs(&course.residual, usual);
+    let Some(run) = by_edges.or(by_level) else { return Vec::new() };
     let rows = course.residual.len();
     let mut edges: Vec<(usize, f64)> = [run.from, run.to]
         .into_iter()

@@ -14,7 +14,7 @@
 
 use crate::stats::median::{median, robust_deviation, running_median};
 use crate::stats::scale::second_differences;
-use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, SHORTEST_RUN, WHITENED_FROM};
+use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, FEW_ROWS, SHORTEST_RUN, WHITENED_FROM};
 use crate::stats::thresholds::probability::Z_RARE;
 
 /// A run of rows, from one up to but not including another, that is shifted, in V.
@@ -25,30 +25,40 @@ pub(crate) struct ShiftedRun {
     pub(crate) shift: f64,
 }
 
-/// The errors of the rows that are seen, whitened, with the sums from which what a run explains follows.
+/// Whitened errors, with the sums from which what a run explains follows.
 struct Whitened {
     phi: f64,
-    /// What each error's predecessor does not predict of it, in V.
+    /// What each error's predecessor does not predict of it, in V; 0 in rows that do not count.
     left: Vec<f64>,
-    /// Sums of `left` up to each row.
+    /// Sums of `left` up to each row, and the numbers of rows that count.
     sums: Vec<f64>,
+    counts: Vec<usize>,
 }
 
 impl Whitened {
-    /// Whitens errors, of which each is in one of the `rows`.
-    fn new(errors: &[f64], rows: &[usize], phi: f64) -> Self {
-        let first = errors.first().map(|error| (1.0 - phi * phi).sqrt() * error);
-        // Behind a gap nothing is known of the error before.
-        let next = |at: usize| rows[at] == rows[at - 1] + 1 || phi == 0.0;
-        let others = (1..errors.len()).map(|at| if next(at) { errors[at] - phi * errors[at - 1] } else { 0.0 });
-        let left: Vec<f64> = first.into_iter().chain(others).collect();
-        let mut sums = vec![0.0];
-        left.iter().enumerate().for_each(|(row, left)| sums.push(sums[row] + left));
-        Self { phi, left, sums }
+    /// Whitens errors; those of rows that do not count are NaN.
+    fn new(errors: &[f64], phi: f64) -> Self {
+        let (mut left, mut sums, mut counts) = (Vec::new(), vec![0.0], vec![0]);
+        for (row, error) in errors.iter().enumerate() {
+            let of_row = match row.checked_sub(1) {
+                _ if phi == 0.0 => *error,
+                None => (1.0 - phi * phi).sqrt() * error,
+                Some(before) => error - phi * errors[before],
+            };
+            left.push(if of_row.is_nan() { 0.0 } else { of_row });
+            sums.push(sums[row] + left[row]);
+            counts.push(counts[row] + usize::from(!of_row.is_nan()));
+        }
+        Self { phi, left, sums, counts }
     }
 
     fn rows(&self) -> usize {
         self.left.len()
+    }
+
+    /// Returns the number of rows that count from one up to but not including another.
+    fn count(&self, from: usize, to: usize) -> usize {
+        self.counts[to] - self.counts[from]
     }
 
     /// Returns the shift of a run that explains most, in V, and the squared error that it explains, in V^2.
@@ -56,17 +66,19 @@ impl Whitened {
         let phi = self.phi;
         let begins = if from == 0 { (1.0 - phi * phi).sqrt() } else { 1.0 };
         let within = 1.0 - phi;
+        let counts = |row: usize| self.count(row, row + 1) as f64;
         let mut sum = begins * self.left[from] + within * (self.sums[to] - self.sums[from + 1]);
-        let mut weight = begins * begins + within * within * (to - from - 1) as f64;
+        let mut weight = begins * begins * counts(from) + within * within * self.count(from + 1, to) as f64;
         if let Some(after) = self.left.get(to) {
             sum -= phi * after;
-            weight += phi * phi;
+            weight += phi * phi * counts(to);
         }
         (sum / weight, sum * sum / weight)
     }
 
     fn gain(&self, from: usize, to: usize) -> f64 {
-        if to < from + SHORTEST_RUN.count() { 0.0 } else { self.best_shift(from, to).1 }
+        let long = to > from && self.count(from, to) >= SHORTEST_RUN.count();
+        if long { self.best_shift(from, to).1 } else { 0.0 }
     }
 
     /// Returns the run that explains most, up to half of the rows long: the others are shifted otherwise.
@@ -119,29 +131,18 @@ impl Whitened {
 }
 
 /// Returns the run whose shift explains most of some errors by its level, and the one that does by its edges where the errors wander. Rows
-/// with NaN count neither for nor against a run; `sigma` is the scale of the noise, in V. None if no run is shifted by more than chance.
-pub(crate) fn shifted_runs(errors: &[f64], sigma: f64) -> Vec<ShiftedRun> {
+/// with NaN count neither for nor against a run; `sigma` is the scale of the noise, in V. `None` for a run that is not shifted by more than
+/// chance.
+pub(crate) fn shifted_runs(errors: &[f64], sigma: f64) -> [Option<ShiftedRun>; 2] {
     let bound = CLIP_FOR_RUN.get() * sigma;
-    let rows: Vec<usize> = (0..errors.len()).filter(|&row| !errors[row].is_nan()).collect();
-    let clipped: Vec<f64> = rows.iter().map(|&row| errors[row].clamp(-bound, bound)).collect();
-    if clipped.len() < 2 * SHORTEST_RUN.count() {
-        return Vec::new();
-    }
-    let seen: Vec<f64> = rows.iter().map(|&row| errors[row]).collect();
-    let phi = autocorrelation(&clipped);
-    let by_edges = if phi > 0.0 { by_edges(&clipped, &rows, phi) } else { None };
-    let in_all_rows = |run: ShiftedRun| ShiftedRun {
-        from: if run.from == 0 { 0 } else { rows[run.from] },
-        to: rows.get(run.to).copied().unwrap_or(errors.len()),
-        ..run
-    };
-    by_level(&seen, &clipped, &rows).into_iter().chain(by_edges).map(in_all_rows).collect()
+    let clipped: Vec<f64> = errors.iter().map(|error| error.clamp(-bound, bound)).collect();
+    [by_level(errors, &clipped), by_edges(clipped)]
 }
 
-/// Returns the run that explains most by its level, among the errors of the rows that are seen.
-fn by_level(seen: &[f64], clipped: &[f64], rows: &[usize]) -> Option<ShiftedRun> {
-    let (from, to) = Whitened::new(clipped, rows, 0.0).best()?;
-    let mut seen = seen[from..to].to_vec();
+/// Returns the run that explains most by its level.
+fn by_level(errors: &[f64], clipped: &[f64]) -> Option<ShiftedRun> {
+    let (from, to) = Whitened::new(clipped, 0.0).best()?;
+    let mut seen: Vec<f64> = errors[from..to].iter().copied().filter(|error| !error.is_nan()).collect();
     // In a burst of stronger noise the mean of a run is far from 0 by chance.
     let noise = robust_deviation(second_differences(&seen)).unwrap_or(0.0);
     // The median is not affected by an outlier in the run.
@@ -149,13 +150,23 @@ fn by_level(seen: &[f64], clipped: &[f64], rows: &[usize]) -> Option<ShiftedRun>
     (shift.abs() * (seen.len() as f64).sqrt() > Z_RARE * noise).then_some(ShiftedRun { from, to, shift })
 }
 
-/// Returns the run that explains most of errors with the autocorrelation `phi`.
-fn by_edges(clipped: &[f64], rows: &[usize], phi: f64) -> Option<ShiftedRun> {
+/// Returns the run that explains most of errors by its edges; few errors have no autocorrelation of their own.
+fn by_edges(mut errors: Vec<f64>) -> Option<ShiftedRun> {
+    let seen: Vec<f64> = errors.iter().copied().filter(|error| !error.is_nan()).collect();
+    if seen.len() < FEW_ROWS.count() {
+        return None;
+    }
+    let phi = autocorrelation(&seen);
+    if phi == 0.0 {
+        return None;
+    }
     // The edges that a single far reading has are none of a run.
-    let whitened = Whitened::new(&running_median(clipped), rows, phi);
+    let smooth = running_median(&seen);
+    errors.iter_mut().filter(|error| !error.is_nan()).zip(smooth).for_each(|(error, smooth)| *error = smooth);
+    let whitened = Whitened::new(&errors, phi);
     let (from, to) = whitened.best()?;
     let (shift, gain) = whitened.best_shift(from, to);
-    let noise = robust_deviation(whitened.left.iter().copied())?;
+    let noise = robust_deviation(whitened.left.iter().copied().filter(|left| *left != 0.0))?;
     (gain.sqrt() > Z_RARE * noise).then_some(ShiftedRun { from, to, shift })
 }
 
@@ -179,7 +190,8 @@ mod tests {
     }
 
     fn found(errors: &[f64]) -> ShiftedRun {
-        shifted_runs(errors, robust_scale(errors)).pop().expect("a run")
+        let [by_level, by_edges] = shifted_runs(errors, robust_scale(errors));
+        by_edges.or(by_level).expect("a run")
     }
 
     #[test]
