@@ -64,6 +64,11 @@ impl Whitened {
     /// Returns the shift of a run that explains most, in V, and the squared error that it explains, in V^2.
     fn best_shift(&self, from: usize, to: usize) -> (f64, f64) {
         let phi = self.phi;
+        if phi == 0.0 {
+            // One difference of sums, so that runs with the same rows that count explain exactly the same.
+            let (sum, weight) = (self.sums[to] - self.sums[from], self.count(from, to) as f64);
+            return (sum / weight, sum * sum / weight);
+        }
         let begins = if from == 0 { (1.0 - phi * phi).sqrt() } else { 1.0 };
         let within = 1.0 - phi;
         let counts = |row: usize| self.count(row, row + 1) as f64;
