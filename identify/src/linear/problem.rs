@@ -1,8 +1,9 @@
 //! The least-squares problem of one or several records: a model's residual, its linear coefficients, and their refinement.
 //!
-//! Given the denominator and the delay, everything else is linear: of each record the zero and the free response, of all records
-//! together the instantaneous part and the numerator; so is a shift of the zero from a given time on. So only the denominator and the delay are searched, by Levenberg-Marquardt
-//! steps on the residual that remains after the linear fit (variable projection, Golub and Pereyra 1973, with Kaufman's Jacobian).
+//! Given the denominator and the delay, everything else is linear: of each record the zero, its shifts from given times on and the free
+//! response, of all records together the instantaneous part and the numerator. So only the denominator and the delay are searched, by
+//! Levenberg-Marquardt steps on the residual that remains after the linear fit (variable projection, Golub and Pereyra 1973, with
+//! Kaufman's Jacobian).
 
 use std::ops::Range;
 
@@ -134,8 +135,8 @@ impl Fit {
         with_own.filter(|(index, ..)| !self.poles.undriven.contains(index)).map(|(_, section, own)| (section, own))
     }
 
-    /// All parameters in the order of the basis: those of each record, their shifts, then instantaneous part and numerators, then, of a linearised
-    /// fit, the logarithms of the sections' parameters and the delay in spacings.
+    /// All parameters in the order of the basis: those of each record, their shifts, then instantaneous part and numerators, then, of a
+    /// linearised fit, the logarithms of the sections' parameters and the delay in spacings.
     pub fn parameters(&self, problem: &Problem) -> Vec<f64> {
         let searched = self.basis.count() - self.coefficients.len();
         let logarithms = self.poles.sections.iter().flat_map(|section| section.logarithms());
@@ -369,7 +370,7 @@ impl Problem {
         })
     }
 
-    /// Places of the shifts of zeros among the [`Fit::parameters`] of a model with so many poles.
+    /// Places of the shifts of zeros among the [`Fit::parameters`] of a model of this order.
     pub fn shift_parameters(&self, order: usize) -> Range<usize> {
         let columns = self.columns_of_records(order);
         columns - self.shifts().count()..columns

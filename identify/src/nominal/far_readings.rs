@@ -22,7 +22,7 @@ const AROUND: usize = 3;
 const LINE: usize = 8;
 /// If more of the readings are far off, they are a part of the response.
 const MOST: f64 = 0.05;
-/// A change of the voltage is a jump if it is so many times as large as the usual one.
+/// A change of the voltage is a jump if its ratio to the usual one is larger.
 const JUMP: f64 = 10.0;
 /// Records with fewer readings have no scale of their own.
 const FEWEST: usize = 20;
