@@ -29,6 +29,8 @@ const LONGEST_TAU: f64 = 3.0;
 const LONGEST_DELAY: f64 = 0.1;
 /// Longest decay of an oscillation, in lengths of the record.
 const LONGEST_DECAY: f64 = 1.0;
+/// A decay is over by the end of a record if less than this part of it is left at the last reading.
+const OVER: f64 = 0.1;
 /// Rejected steps in succession after which a refinement ends.
 const MOST_REJECTED: usize = 6;
 
@@ -202,14 +204,15 @@ impl Fit {
 }
 
 impl Problem {
-    /// Zero of a record: the reading at rest without a voltage, where something else drifts the one at the first reading.
+    /// Zero of a record: the reading at rest without a voltage. Where something else drifts all along the record, the one at its first
+    /// reading; where that is over by the end, the one that it leaves behind.
     pub fn zero(&self, fit: &Fit, record: usize) -> f64 {
         let own = fit.own(record);
         let undriven = |place: &usize| match fit.poles.sections[*place] {
-            Section::First { .. } => {
+            Section::First { tau } if (-self.series[record].duration() / tau).exp() > OVER => {
                 own[1 + fit.poles.sections[..*place].iter().map(|before| before.order()).sum::<usize>()]
             }
-            Section::Second { .. } => 0.0,
+            Section::First { .. } | Section::Second { .. } => 0.0,
         };
         self.means[record] + own[0] + fit.poles.undriven.iter().map(undriven).sum::<f64>()
     }

@@ -77,6 +77,10 @@ fn what_the_voltage_does_not_drive_is_no_part_of_the_spring() {
     }
     // That of the first reading.
     assert!((drift.nominal.zero.value - 3.0).abs() < 0.2, "{:?}", drift.nominal.zero);
+    // That of the rest of the record.
+    let warm_up = with(&|time_s| 5.0 * f64::exp(-time_s / 15.0));
+    assert_eq!((warm_up.order, warm_up.undriven_order), (1, 1), "{warm_up:?}");
+    assert!((warm_up.nominal.zero.value - 3.0).abs() < 0.2, "{:?}", warm_up.nominal.zero);
     assert_eq!(with(&|_| 0.0).undriven_order, 0);
 }
 

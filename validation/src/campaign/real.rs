@@ -267,6 +267,7 @@ Errors are root mean squares in percent of the standard deviation of the record'
 `vsj diagnose --plant identify` adds to it: held out are the values of its causes, while the spring under them was identified from
 all rows, so that `extended` without a cause is an error in sample. `linear` is the best linear output-error model of order 1 to 3,
 and to 4. PySINDy and SysIdentPy are run on the last 40 % alone. `-`: not asked for, or diverged.
+Where the first 60 % drift to their end, the zero of `nominal` is that of the first reading.
 
 "
     .to_owned();
