@@ -96,6 +96,7 @@ impl Report {
     pub fn new(setup: &Setup) -> Result<Self> {
         let Setup { readings, tips, stack, beam, load, tolerance, at_m, voltage_v, interlayer_pa_per_m, elements } =
             setup;
+        check("voltage_v", *voltage_v, 0.0..=1000.0, "V")?;
         let bent = Deflection::new(beam, load, *tolerance)?;
         let deflection = Statics {
             linear_error: bent.linear_error,
@@ -114,12 +115,13 @@ impl Report {
         let whole = Beam { length_m: stack.length_m(), thickness_m: stack.thickness_m(), ..*beam };
         let widest = stack.layers().iter().map(|layer| layer.width_m).fold(0.0, f64::max);
         let experiment = Experiment::new(readings, &Beam { width_m: widest, ..whole }.checked()?)?;
-        let identified = Identified::new(stack, &experiment, tips)?;
-        check("voltage_v", *voltage_v, 0.0..=1000.0, "V")?;
-        let interlayer = interlayer_pa_per_m.unwrap_or_else(|| identified.interlayer_pa_per_m(*voltage_v));
         let stiffened = stack.with_modulus(ACTIVE, active_modulus_pa(*voltage_v)?)?;
         let bend = |interlayer: f64| bend(&stiffened, interlayer, load.tip_n, *elements);
-        let bent = bend(interlayer)?;
+        // Before the search of the identification, so that an input out of range is refused without it.
+        let given = interlayer_pa_per_m.map(bend).transpose()?;
+        let identified = Identified::new(stack, &experiment, tips)?;
+        let interlayer = interlayer_pa_per_m.unwrap_or_else(|| identified.interlayer_pa_per_m(*voltage_v));
+        let bent = given.map_or_else(|| bend(interlayer), Ok)?;
         let shape = |bent: &Bent| bent.nodes.iter().map(|&(x, w)| (1e3 * x, 1e3 * w)).collect();
         let shapes = vec![
             ("with slip", shape(&bent)),

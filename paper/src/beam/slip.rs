@@ -22,6 +22,10 @@ use simulation::bad_input;
 /// The report's section 4.1.4, as printed.
 const TIPS: &str = include_str!("../../../data/section414_tip_displacement.csv");
 
+/// Value of a function that counts as zero, and the number of steps after which the nearest end is taken.
+const CROSSED: f64 = 1e-10;
+const MOST_STEPS: usize = 60;
+
 /// A tip displacement under a force: measured, and computed by the report's finite elements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tip {
@@ -62,13 +66,7 @@ pub fn identify_pa_per_m(stack: &Stack, measured_n_per_m: f64) -> Result<f64> {
              (nearly bonded)"
         );
     }
-    let (mut low, mut high) = (1.0, BONDED_PA_PER_M);
-    for _ in 0..50 {
-        let middle = (low * high).sqrt();
-        let softer = spring_constant_n_per_m(stack, middle, ELEMENTS)? < measured_n_per_m;
-        if softer { low = middle } else { high = middle }
-    }
-    Ok((low * high).sqrt())
+    crossing(1.0, BONDED_PA_PER_M, |slip| Ok((spring_constant_n_per_m(stack, slip, ELEMENTS)? / measured_n_per_m).ln()))
 }
 
 /// The spring with identified interlayer stiffness.
@@ -195,20 +193,37 @@ impl Identified {
 
 /// Young's modulus in Pa of the active layer that gives a spring constant at unchanged slip; `None` above 10 TPa.
 fn active_alone(stack: &Stack, interlayer_pa_per_m: f64, n_per_m: f64) -> Result<Option<f64>> {
-    let stiff = |pascal: f64| {
-        Ok::<_, anyhow::Error>(
-            spring_constant_n_per_m(&stack.with_modulus(ACTIVE, pascal)?, interlayer_pa_per_m, ELEMENTS)? >= n_per_m,
-        )
+    let stiffer = |pascal: f64| {
+        let stack = stack.with_modulus(ACTIVE, pascal)?;
+        Ok::<_, anyhow::Error>((spring_constant_n_per_m(&stack, interlayer_pa_per_m, ELEMENTS)? / n_per_m).ln())
     };
-    let (mut low, mut high) = (1e6f64, 1e13f64);
-    if !stiff(high)? {
-        return Ok(None);
+    let highest = 1e13;
+    if stiffer(highest)? < 0.0 { Ok(None) } else { crossing(1e6, highest, stiffer).map(Some) }
+}
+
+/// Returns where a rising function of a positive argument passes zero between `low` and `high`, or the end that is nearer if it does
+/// not pass zero: false position on a logarithmic scale, with the value of an end halved that stays (the Illinois method; Dowell and
+/// Jarratt, *BIT* 11, 1971).
+fn crossing(low: f64, high: f64, rising: impl Fn(f64) -> Result<f64>) -> Result<f64> {
+    let point = |at: f64| Ok::<_, anyhow::Error>((at, rising(at.exp())?));
+    let (mut low, mut high) = (point(low.ln())?, point(high.ln())?);
+    let mut rose = None;
+    for _ in 0..MOST_STEPS {
+        if low.1 >= 0.0 || high.1 <= 0.0 {
+            break;
+        }
+        let new = point((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))?;
+        let rises = new.1 < 0.0;
+        let (end, other) = if rises { (&mut low, &mut high) } else { (&mut high, &mut low) };
+        *end = new;
+        if new.1.abs() < CROSSED {
+            break;
+        }
+        if rose.replace(rises) == Some(rises) {
+            other.1 *= 0.5;
+        }
     }
-    for _ in 0..40 {
-        let middle = (low * high).sqrt();
-        if stiff(middle)? { high = middle } else { low = middle }
-    }
-    Ok(Some(high))
+    Ok(if low.1.abs() < high.1.abs() { low.0 } else { high.0 }.exp())
 }
 
 #[cfg(test)]
