@@ -8,13 +8,16 @@
 //! spectral line between two frequencies of the record is not missed.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
-use rustfft::FftPlanner;
+use rustfft::algorithm::Radix4;
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 
 thread_local! {
-    // Planning a transform costs more than the transform, and few lengths occur.
-    static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
+    // By length. To make a transform costs more than to use it, and few lengths occur.
+    static TRANSFORMS: RefCell<HashMap<usize, Rc<Radix4<f64>>>> = RefCell::default();
 }
 
 /// Returns the power at frequencies from 0 to half a cycle per row, in the squared unit of the values.
@@ -22,8 +25,15 @@ pub(crate) fn powers(values: &[f64]) -> Vec<f64> {
     let length = (2 * values.len()).next_power_of_two();
     let mut buffer: Vec<Complex<f64>> = values.iter().map(|&value| Complex::new(value, 0.0)).collect();
     buffer.resize(length, Complex::default());
-    PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(length)).process(&mut buffer);
+    transform(length).process(&mut buffer);
     buffer[..=length / 2].iter().map(Complex::norm_sqr).collect()
+}
+
+/// Returns the transform of a length, a power of two. It is made without a planner, which would compile every algorithm for every
+/// set of vector instructions, and whose choice would change the last bits from processor to processor.
+fn transform(length: usize) -> Rc<Radix4<f64>> {
+    let new = || Rc::new(Radix4::new(length, FftDirection::Forward));
+    TRANSFORMS.with_borrow_mut(|transforms| transforms.entry(length).or_insert_with(new).clone())
 }
 
 #[cfg(test)]
