@@ -1,4 +1,5 @@
 // The client and a running board, whose port is the argument.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
@@ -41,7 +42,10 @@ int main(int argc, char** argv) {
         std::this_thread::sleep_for(std::chrono::duration<double>(1.2 * link.status().silence_limit_s));
         expect(link.status().sample.state == vsj::State::armed, "armed by heartbeats");
         const auto samples = link.watch(50, std::chrono::milliseconds(500));
-        expect(samples.size() >= 20 && samples.size() <= 26, std::to_string(samples.size()) + " samples to be 25");
+        expect(samples.size() >= 20, std::to_string(samples.size()) + " samples to be 25");
+        // By the board's clock: the emulator's may run ahead of the host's for a while.
+        const double periods = double(samples.back().tick - samples.front().tick) / 20;
+        expect(std::abs(periods + 1 - double(samples.size())) <= 1, "a sample every 20 ticks");
         for (std::size_t at = 1; at < samples.size(); ++at)
             // Up to half a period is jitter, not a loss.
             expect(samples[at].tick <= samples[at - 1].tick + 30, "no sample lost");
