@@ -243,6 +243,21 @@ mod tests {
         }
     }
 
+    /// The steep end of the second function is where false position alone hardly moves.
+    #[test]
+    fn a_crossing_is_found_in_few_steps_or_its_nearer_end_returned() {
+        let steps = std::cell::Cell::new(0);
+        let counted = |value: f64| {
+            steps.set(steps.get() + 1);
+            Ok(value)
+        };
+        assert!((crossing(1.0, 1e14, |at| counted((at / 3e8).ln())).unwrap() / 3e8 - 1.0).abs() < 1e-9);
+        assert!((crossing(1.0, 1e14, |at| counted(at / 3e8 - 1.0)).unwrap() / 3e8 - 1.0).abs() < 1e-9);
+        assert!(steps.get() < 60, "{}", steps.get());
+        assert_eq!(crossing(2.0, 8.0, Ok).unwrap(), 2.0);
+        assert!((crossing(2.0, 8.0, |at| Ok(at - 9.0)).unwrap() - 8.0).abs() < 1e-12);
+    }
+
     /// Identified at 0 and 700 V, checked at 400 V: linear growth predicts it within 2 %, quadratic growth does not.
     #[test]
     fn the_middle_voltage_supports_linear_growth_of_the_coupling() {
