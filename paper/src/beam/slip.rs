@@ -22,8 +22,9 @@ use simulation::bad_input;
 /// The report's section 4.1.4, as printed.
 const TIPS: &str = include_str!("../../../data/section414_tip_displacement.csv");
 
-/// Value of a function that counts as zero, and the number of steps after which the nearest end is taken.
+/// Magnitude of a function below which [`crossing`] takes it for zero.
 const CROSSED: f64 = 1e-10;
+/// Number of steps after which [`crossing`] returns the end that is nearer.
 const MOST_STEPS: usize = 60;
 
 /// A tip displacement under a force: measured, and computed by the report's finite elements.
@@ -213,12 +214,12 @@ fn crossing(low: f64, high: f64, rising: impl Fn(f64) -> Result<f64>) -> Result<
             break;
         }
         let new = point((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))?;
+        if new.1.abs() < CROSSED {
+            return Ok(new.0.exp());
+        }
         let rises = new.1 < 0.0;
         let (end, other) = if rises { (&mut low, &mut high) } else { (&mut high, &mut low) };
         *end = new;
-        if new.1.abs() < CROSSED {
-            break;
-        }
         if rose.replace(rises) == Some(rises) {
             other.1 *= 0.5;
         }
