@@ -209,10 +209,8 @@ fn crossing(low: f64, high: f64, rising: impl Fn(f64) -> Result<f64>) -> Result<
     let point = |at: f64| Ok::<_, anyhow::Error>((at, rising(at.exp())?));
     let (mut low, mut high) = (point(low.ln())?, point(high.ln())?);
     let mut rose = None;
-    for _ in 0..MOST_STEPS {
-        if low.1 >= 0.0 || high.1 <= 0.0 {
-            break;
-        }
+    let steps = if low.1 < 0.0 && high.1 > 0.0 { MOST_STEPS } else { 0 };
+    for _ in 0..steps {
         let new = point((low.0 * high.1 - high.0 * low.1) / (high.1 - low.1))?;
         if new.1.abs() < CROSSED {
             return Ok(new.0.exp());
