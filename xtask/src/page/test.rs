@@ -46,12 +46,13 @@ pub(super) fn run(page: &Path) -> Result<()> {
     let vsj = build::vsj()?;
     let folder = env::temp_dir().join(format!("vsj-page-{}", std::process::id()));
     let mut test = Test { browser: Browser::start(folder.join("browser"))?, vsj, folder };
-    let tests: [(&str, Check); 11] = [
+    let tests: [(&str, Check); 12] = [
         ("the stair has the command's numbers", Test::stair),
         ("every field has a label", Test::labels),
         ("a target drawn by pointer and keys has the command's numbers", Test::drawn),
         ("settings out of range show the command's error", Test::refused),
         ("a hidden effect is diagnosed like the command's", Test::hidden),
+        ("a spring is identified with its cause like the command's", Test::identified),
         ("a file is diagnosed like the command's", Test::file),
         ("several records are diagnosed like the command's", Test::several),
         ("the next experiment is the command's, and is simulated", Test::planned),
@@ -219,21 +220,40 @@ impl Test {
         Ok(serde_json::from_str(&self.browser.text("diagnosis-json")?)?)
     }
 
+    /// A curve, of which the identified spring has the mean slope: once it is known, nothing else is left to find. Under a loop the
+    /// identified spring has lags without a use, and the last digits of the answer depend on rounding.
+    fn identified(&mut self) -> Result<()> {
+        self.browser.set("effect", "static-nonlinearity")?;
+        self.control()?;
+        self.browser.click("save-record")?;
+        let csv = self.browser.downloaded("record.csv")?;
+        self.write("curve.csv", &csv)?;
+        let file = self.folder.join("curve.csv");
+        self.browser.choose("file", &file)?;
+        self.browser.wait("document.getElementById('file-name').textContent.startsWith('curve')", CONTROL)?;
+        self.browser.set("nominal", "identify")?;
+        self.browser.click("diagnose")?;
+        let page = self.found()?;
+        same("diagnose", &page, &self.command(&["diagnose", "curve.csv", "--plant", "identify"])?, CONVERGENCE)?;
+        let cause = &page["findings"][0]["cause"];
+        ensure!(cause == "static-nonlinearity", "the first finding is {cause}");
+        Ok(())
+    }
+
     fn file(&mut self) -> Result<()> {
         let record = shell::root().join(RECORD);
         let name = record.file_name().and_then(|name| name.to_str()).context("a name")?;
         fs::copy(&record, self.folder.join(name))?;
         self.browser.choose("file", &record)?;
-        self.browser.wait("!document.getElementById('diagnose').disabled", CONTROL)?;
-        for (command, nominal) in [("identify", "paper"), ("diagnose", "identify"), ("diagnose", "paper")] {
-            self.browser.set("nominal", nominal)?;
+        self.browser.wait("document.getElementById('file-name').textContent.startsWith('sample')", CONTROL)?;
+        self.browser.set("nominal", "paper")?;
+        for command in ["identify", "diagnose"] {
             let begin = Instant::now();
             self.browser.click(command)?;
             let page = self.found()?;
             let browser = begin.elapsed().as_secs_f64();
             let begin = Instant::now();
-            let plant: &[&str] = if command == "diagnose" { &["--plant", nominal] } else { &[] };
-            let answer = self.command(&[&[command, name], plant].concat())?;
+            let answer = self.command(&[command, name])?;
             println!(
                 "{command} takes {browser:.1} s in the page, {:.1} s on the command line",
                 begin.elapsed().as_secs_f64()
