@@ -75,6 +75,23 @@ fn curve_away_from_zero_is_named_alone() {
     assert!((tau_s / 6.0 - 1.0).abs() < 0.1, "{tau_s} s");
 }
 
+/// A loop of 70.75 V before one lag of 5.5 s. A linear model imitates it by further lags, which the spring does not have once the loop
+/// is known.
+#[test]
+fn lags_that_imitate_a_loop_are_dropped_with_it() {
+    let text = include_str!("../../data/sample_hysteresis.csv");
+    let record = Record::parse("sample", text, "stiffness").unwrap();
+    let (diagnosis, _) = diagnosed(record);
+    let report = &diagnosis.report;
+    let [loop_] = report.findings.as_slice() else { panic!("{report:?}") };
+    let width = &loop_.parameters[0].1;
+    assert!(loop_.cause == "hysteresis" && width.low < 70.75 && 70.75 < width.high, "{loop_:?}");
+    assert!(report.nominal.tau_s.len() > 1, "no lag imitates it: {:?}", report.nominal);
+    let relaxation = &diagnosis.plant.relaxation;
+    assert!((relaxation.share - 1.0 / 11.0).abs() < 0.001, "{relaxation:?}");
+    assert!(relaxation.tau_s.len() == 1 && (relaxation.tau_s[0] - 5.5).abs() < 0.02, "{relaxation:?}");
+}
+
 /// Rows that were not diagnosed are predicted with zero, gain, curve and lag of those that were.
 #[test]
 fn rows_that_were_not_diagnosed_are_predicted() {

@@ -62,6 +62,27 @@ pub fn moved(relaxation: &Relaxation, mut values: impl Iterator<Item = f64>) -> 
     moved
 }
 
+/// Returns the [`coordinates`] without each of the further lags and oscillations that still have a weight: weights of 0 and the rest of
+/// them are kept in a fit. Empty without coordinates.
+pub fn without_each(relaxation: &Relaxation, coordinates: &[(Coordinate, f64)]) -> Vec<Vec<(Coordinate, f64)>> {
+    let lags = relaxation.parts().map(|_| (2, 1));
+    let oscillations = relaxation.oscillations().map(|_| (4, 2));
+    let mut first = TIME_CONSTANT + 1;
+    let mut without = Vec::new();
+    for (count, weights) in lags.chain(oscillations).take_while(|_| !coordinates.is_empty()) {
+        let mut kept = coordinates.to_vec();
+        let own = &mut kept[first..first + count];
+        first += count;
+        if own.iter().any(|(coordinate, _)| !coordinate.fitted) {
+            continue;
+        }
+        own.iter_mut().for_each(|(coordinate, _)| coordinate.fitted = false);
+        own[count - weights..].iter_mut().for_each(|(_, weight)| *weight = 0.0);
+        without.push(kept);
+    }
+    without
+}
+
 /// Returns true for a cause that would be another value of what is estimated with an identified relaxation.
 pub fn contains(relaxation: &Relaxation, cause: &str) -> bool {
     match cause {
@@ -77,15 +98,19 @@ mod tests {
     use crate::record::input::Input;
     use simulation::record::Record;
 
-    #[test]
-    fn coordinates_of_a_relaxation_give_it_back() {
+    /// A relaxation and its coordinates.
+    fn two_lags_and_an_oscillation() -> (Relaxation, Vec<(Coordinate, f64)>) {
         let rows: String = (0..20).map(|row| format!("{row},{},0\n", 100 * (row / 5 % 2))).collect();
         let record = Record::parse("r", &format!("time_s,voltage_v,stiffness\n{rows}"), "stiffness").unwrap();
-        let data = Data::new(&record, Input::Hold);
         let mut relaxation = Relaxation::plain(0.1, 4.0);
         relaxation.further[0] = Part { part: -0.3, tau_s: 0.7 };
         relaxation.modes[0] = Mode { freq_hz: 0.2, zeta: 0.1, weight: 0.4, rate_weight: -0.05 };
-        let coordinates = coordinates(&relaxation, &data);
+        (relaxation, coordinates(&relaxation, &Data::new(&record, Input::Hold)))
+    }
+
+    #[test]
+    fn coordinates_of_a_relaxation_give_it_back() {
+        let (relaxation, coordinates) = two_lags_and_an_oscillation();
         assert_eq!(coordinates.len(), 8);
         assert!(coordinates.iter().all(|(of, value)| of.lowest < *value && *value < of.highest), "{coordinates:?}");
         let back = moved(&relaxation, coordinates.iter().map(|(_, value)| *value));
@@ -94,6 +119,21 @@ mod tests {
         assert!(near(back.further[0].tau_s, 0.7) && back.further[0].part == -0.3, "{back:?}");
         assert!(near(back.modes[0].freq_hz, 0.2) && near(back.modes[0].zeta, 0.1), "{back:?}");
         assert_eq!((back.modes[0].weight, back.modes[0].rate_weight), (0.4, -0.05));
+    }
+
+    #[test]
+    fn each_lag_and_oscillation_is_left_out_once() {
+        let (relaxation, all) = two_lags_and_an_oscillation();
+        assert!(without_each(&relaxation, &[]).is_empty());
+        let without = without_each(&relaxation, &all);
+        let fixed = |of: &[(Coordinate, f64)]| -> Vec<usize> { (0..8).filter(|&at| !of[at].0.fitted).collect() };
+        assert_eq!(without.iter().map(|of| fixed(of)).collect::<Vec<_>>(), [vec![2, 3], vec![4, 5, 6, 7]]);
+        let of = |kept: &[(Coordinate, f64)]| moved(&relaxation, kept.iter().map(|(_, value)| *value));
+        assert_eq!((of(&without[0]).parts().count(), of(&without[0]).oscillations().count()), (0, 1));
+        assert_eq!((of(&without[1]).parts().count(), of(&without[1]).oscillations().count()), (1, 0));
+        let neither = without_each(&relaxation, &without[0]);
+        assert_eq!(neither.iter().map(|of| fixed(of)).collect::<Vec<_>>(), [vec![2, 3, 4, 5, 6, 7]]);
+        assert!(without_each(&relaxation, &neither[0]).is_empty());
     }
 
     #[test]

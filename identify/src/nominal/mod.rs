@@ -19,7 +19,7 @@ mod usable;
 mod zero_shifts;
 
 pub use identified::{Course, Identified};
-pub use models::{BestLinear, best_linear};
+pub use models::{BestLinear, WORTHWHILE, best_linear};
 
 use std::borrow::Cow;
 
@@ -31,7 +31,7 @@ use simulation::units::Units;
 
 use crate::linear::{Problem, Series, best_up_to};
 use crate::nominal::identified::described;
-use crate::nominal::models::{Models, WORTHWHILE};
+use crate::nominal::models::Models;
 use crate::nominal::plant::VoltageRange;
 use crate::nominal::report::{AtBound, FarReading, InputLaw, ZeroShift};
 use crate::nominal::usable::check;

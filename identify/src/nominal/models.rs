@@ -15,7 +15,7 @@ use crate::stats::sums::dot;
 use crate::stats::thresholds::probability::{RIVAL_ODDS, Z, Z_DOUBTFUL, Z_WORSE};
 
 /// A larger model is preferred if its held-out error is smaller by this part, ...
-pub(super) const WORTHWHILE: f64 = 0.005;
+pub const WORTHWHILE: f64 = 0.005;
 /// ... and its error on the last part of the records, which is an extrapolation, is at most this many times as large: beyond, it
 /// does not hold at all. Below, a remark says what is lost.
 pub(super) const MOST_SPOILED: f64 = 10.0;

@@ -8,6 +8,7 @@ use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
 use crate::verdict::cause::Cause;
+use crate::verdict::fewer_lags::with_fewer_lags;
 use crate::verdict::ranking;
 
 /// Ratio of the held-out errors up to which the relaxation stays as it was identified.
@@ -53,15 +54,14 @@ pub(crate) fn search(
     let error = |residual: &[f64]| root_mean_square(&observed.errors(residual));
     let most = LARGEST_ERROR_RATIO.get() * error(&baseline.residual);
     let is_larger = |fit: &Fit| error(&fit.residual) > most;
+    let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
     if is_larger(&best.fit) || search.evaluator().budget().was_cut() {
-        let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
         best = search.predicting(best, is_larger, held_out);
     }
     // An identified spring is the best without causes, stays as it is if the causes need no other, and causes under which it predicts
     // worse are none.
     if search.evaluator().data.normalisation.identified {
         let engine = search.evaluator();
-        let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
         let as_identified = engine.fit_twice(Model { relaxation: Vec::new(), ..best.fit.model.clone() });
         let mut predicted = held_out(engine, &best.fit);
         let kept = held_out(engine, &as_identified);
@@ -84,6 +84,8 @@ pub(crate) fn search(
     let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
     let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
     let contenders = ranking::contenders(&search, &causes);
+    // Last: what the causes are compared with keeps all lags.
+    best.fit = with_fewer_lags(search.evaluator(), best.fit, held_out);
     Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best, explored: search.into_explored() })
 }
 

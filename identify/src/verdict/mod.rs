@@ -23,6 +23,7 @@ pub(crate) mod credibility;
 pub mod diagnosis;
 pub mod export;
 mod extrapolation;
+mod fewer_lags;
 pub mod finding;
 mod form_average;
 pub(crate) mod found;
