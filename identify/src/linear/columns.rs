@@ -58,7 +58,7 @@ impl Column {
         (start - self.first..end - self.first, start - other.first..end - other.first)
     }
 
-    fn norm(&self) -> f64 {
+    pub(super) fn norm(&self) -> f64 {
         dot(&self.values, &self.values).sqrt()
     }
 }
@@ -77,34 +77,42 @@ impl Orthonormal {
     /// Adds a column; returns true if it is independent.
     pub(super) fn add(&mut self, mut column: Column) -> bool {
         let whole = column.norm();
-        let mut entries = vec![0.0; self.q.len() + 1];
+        let mut entries = self.reduce(&mut column);
+        let left = column.norm();
+        // Also rejects a column that is not finite.
+        let independent = left > DEPENDENT * whole && left.is_finite() && left > 0.0;
+        if independent {
+            column.values.iter_mut().for_each(|value| *value /= left);
+        } else {
+            column.values.clear();
+        }
+        entries.push(if independent { left } else { 0.0 });
+        self.q.push(column);
+        self.r.push(entries);
+        independent
+    }
+
+    /// Subtracts from a column what the columns span of it, to all digits; returns the coordinates of that.
+    pub(super) fn reduce(&self, column: &mut Column) -> Vec<f64> {
+        let whole = column.norm();
+        let mut entries = vec![0.0; self.q.len()];
         let mut before = whole;
         loop {
             for (entry, q) in entries.iter_mut().zip(&self.q) {
-                let part = q.times(&column);
+                let part = q.times(column);
                 if part != 0.0 {
                     column.subtract(part, q);
                     *entry += part;
                 }
             }
             let after = column.norm();
-            if after > CANCELLED * before || after <= DEPENDENT * whole {
-                before = after;
-                break;
+            // Not so for a column that is not finite.
+            let cancelled = after <= CANCELLED * before && after > DEPENDENT * whole;
+            if !cancelled {
+                return entries;
             }
             before = after;
         }
-        // Also rejects a column that is not finite.
-        let independent = before > DEPENDENT * whole && before.is_finite() && before > 0.0;
-        if independent {
-            entries[self.q.len()] = before;
-            column.values.iter_mut().for_each(|value| *value /= before);
-        } else {
-            column.values.clear();
-        }
-        self.q.push(column);
-        self.r.push(entries);
-        independent
     }
 
     /// Subtracts the projection of `values` from them; returns its coordinates on the orthonormal columns.
@@ -178,5 +186,17 @@ mod tests {
             assert!((found - expected).abs() < 1e-8, "{found} {expected}");
         }
         assert!(rest.norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_column_that_is_not_finite_is_left_out() {
+        let mut columns = Orthonormal::new();
+        assert!(columns.add(Column { first: 0, values: vec![1.0; 10] }));
+        for value in [f64::NAN, f64::INFINITY] {
+            let mut values = normals(10);
+            values[3] = value;
+            assert!(!columns.add(Column { first: 0, values }));
+        }
+        assert_eq!(columns.project(&mut Column { first: 0, values: vec![2.0; 10] })[1..], [0.0, 0.0]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::linear::section::{Section, State, Transition};
+use crate::linear::section::{Each, Following, Section, States, TOGETHER, Transition};
 use crate::linear::series::{Piece, Series};
 
 /// Times closer than this, in spacings of the rows, count as equal.
@@ -34,9 +34,9 @@ pub(super) struct Path {
 
 /// Response of one section at each reading.
 pub(super) struct Response {
-    /// `w` and `v` under the voltage, from rest at the voltage of the first reading.
+    /// `w` and `v` under the voltage, from rest at the voltage of the first reading; a lag has no `v`.
     pub(super) forced: [Vec<f64>; 2],
-    /// `w` without a voltage, and `-v`, from `w = 1` and `v = 0`: the two span all free responses. 0 of a spring at rest.
+    /// `w` without a voltage, and `-v`, from `w = 1` and `v = 0`: the two span all free responses. Empty if the spring was at rest.
     pub(super) free: [Vec<f64>; 2],
 }
 
@@ -115,27 +115,45 @@ impl Path {
         builder.path
     }
 
-    /// The response of a section at each reading.
-    pub(super) fn response(&self, section: Section) -> Response {
-        let rows = self.voltage.len();
-        let column = || Vec::with_capacity(rows);
-        let mut response = Response { forced: [column(), column()], free: [column(), column()] };
-        let over: Vec<Transition> = self.lengths.iter().map(|&length| section.over(length)).collect();
-        let (mut state, mut free): (State, State) = ([self.before, 0.0], [f64::from(u8::from(!self.at_rest)), 0.0]);
-        let mut put = |state: State, free: State| {
-            for of in 0..2 {
-                response.forced[of].push(state[of]);
-                response.free[of].push(free[of]);
-            }
+    /// The responses of several sections at each reading.
+    pub(super) fn responses(&self, sections: &[Section]) -> Vec<Response> {
+        // In a last group that is not full its last section is repeated.
+        let groups = sections.chunks(TOGETHER).map(|of| std::array::from_fn(|lane| of[lane.min(of.len() - 1)]));
+        groups.flat_map(|group| self.of_group(group)).take(sections.len()).collect()
+    }
+
+    fn of_group(&self, sections: [Section; TOGETHER]) -> [Response; TOGETHER] {
+        let over: Vec<Transition> = self.lengths.iter().map(|&length| Transition::of(&sections, length)).collect();
+        let following = Following::of(&sections);
+        let forced = self.states(self.before, |states, Step { length, voltage, slope, .. }| {
+            following.step(&over[*length as usize], states, *voltage, *slope)
+        });
+        let free = match self.at_rest {
+            true => [Vec::new(), Vec::new()],
+            false => self.states(1.0, |states, step| over[step.length as usize].free(states)),
         };
+        std::array::from_fn(|place| {
+            let has_v = sections[place].order() == 2;
+            let of = |[ws, vs]: &[Vec<Each>; 2]| {
+                let v = if has_v { vs.iter().map(|v| v[place]).collect() } else { Vec::new() };
+                [ws.iter().map(|w| w[place]).collect(), v]
+            };
+            Response { forced: of(&forced), free: of(&free) }
+        })
+    }
+
+    /// The states of the sections at each reading, from `w` at the start and by a function of the states before a step.
+    fn states(&self, start: f64, next: impl Fn(States, &Step) -> States) -> [Vec<Each>; 2] {
+        let rows = self.voltage.len();
+        let [mut ws, mut vs] = [Vec::with_capacity(rows), Vec::with_capacity(rows)];
+        let mut states = [[start; TOGETHER], [0.0; TOGETHER]];
         for step in &self.steps {
-            let over = &over[step.length as usize];
-            state = section.step(over, state, step.voltage, step.slope);
-            free = over.free(free);
+            states = next(states, step);
             if step.read {
-                put(state, free);
+                ws.push(states[0]);
+                vs.push(states[1]);
             }
         }
-        response
+        [ws, vs]
     }
 }

@@ -6,12 +6,13 @@
 //! Kaufman's Jacobian).
 
 use std::ops::Range;
+use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::linear::columns::{Column, Orthonormal};
 use crate::linear::path::{Path, Response};
-use crate::linear::section::Section;
+use crate::linear::section::{Section, TOGETHER};
 use crate::linear::series::Series;
 use crate::stats::sums::dot;
 
@@ -31,6 +32,8 @@ const LONGEST_DELAY: f64 = 0.1;
 const LONGEST_DECAY: f64 = 1.0;
 /// A decay is over by the end of a record if less than this part of it is left at the last reading.
 const OVER: f64 = 0.1;
+/// A column of which the model spans all but this part adds nothing to it.
+const DEPENDENT: f64 = 1e-7;
 /// Rejected steps in succession after which a refinement ends.
 const MOST_REJECTED: usize = 6;
 
@@ -410,15 +413,13 @@ impl Problem {
     /// The costs of a fitted model with each of several further sections, which are cheaper than a fit of each.
     pub(super) fn costs_with(&self, paths: &[Path], base: &Fit, sections: &[Section]) -> Vec<f64> {
         let residual = Column { first: 0, values: base.residual.clone() };
-        let cost = |section: Section| {
-            let responses: Vec<Response> = paths.iter().map(|path| path.response(section)).collect();
+        let cost = |section: &Section, responses: &[&Response]| {
             let mut further = Orthonormal::new();
             let mut add = |column: Column| {
                 let (mut column, whole) = (self.weighted(column), further.count());
-                let before = column.times(&column).sqrt();
-                base.basis.project(&mut column);
-                base.basis.project(&mut column);
-                let independent = column.times(&column).sqrt() > 1e-7 * before;
+                let before = column.norm();
+                base.basis.reduce(&mut column);
+                let independent = column.norm() > DEPENDENT * before;
                 if independent && further.add(column) { further.q[whole].times(&residual).powi(2) } else { 0.0 }
             };
             let mut reduction = 0.0;
@@ -433,12 +434,18 @@ impl Problem {
             }
             base.cost - reduction
         };
-        sections.iter().map(|&section| cost(section)).collect()
+        // A few at a time: the responses of all are large.
+        let of_some = |sections: &[Section]| -> Vec<f64> {
+            let of_paths = self.responses(paths, sections);
+            let of_section = |place: usize| of_paths.iter().map(|of| &of[place]).collect::<Vec<_>>();
+            sections.iter().enumerate().map(|(place, section)| cost(section, &of_section(place))).collect()
+        };
+        sections.chunks(TOGETHER).flat_map(of_some).collect()
     }
 
     /// The responses by record and section.
     fn responses(&self, paths: &[Path], sections: &[Section]) -> Vec<Vec<Response>> {
-        paths.iter().map(|path| sections.iter().map(|&section| path.response(section)).collect()).collect()
+        paths.iter().map(|path| path.responses(sections)).collect()
     }
 
     fn fitted(&self, paths: &[Path], responses: &[Vec<Response>], poles: Poles) -> Fit {
@@ -489,18 +496,30 @@ impl Problem {
     /// Fits the linear coefficients and adds the derivatives by the searched parameters to the basis: the logarithms of each
     /// section, then the delay in spacings of the rows, if it is not searched in whole rows.
     pub fn linearised(&self, poles: Poles) -> Fit {
-        let paths = self.paths(poles.delay);
-        let responses = self.responses(&paths, &poles.sections);
-        let mut fit = self.fitted(&paths, &responses, poles);
+        self.linearised_on(&self.paths(poles.delay), poles)
+    }
+
+    /// The same on voltages that are already delayed.
+    fn linearised_on(&self, paths: &[Path], poles: Poles) -> Fit {
+        let responses = self.responses(paths, &poles.sections);
+        let fit = self.fitted(paths, &responses, poles);
+        self.with_derivatives(fit, paths, &responses)
+    }
+
+    /// A fit with the derivatives by the searched parameters in its basis.
+    fn with_derivatives(&self, mut fit: Fit, paths: &[Path], responses: &[Vec<Response>]) -> Fit {
         let own = Self::own_columns(fit.poles.order());
         let shared = self.columns_of_records(fit.poles.order());
+        let sections = fit.poles.sections.iter();
+        let each_moved =
+            sections.flat_map(|section| (0..section.order()).map(|which| section.times(which, f64::exp(SMALL))));
+        let moved = self.responses(paths, &each_moved.collect::<Vec<_>>());
         let mut column = 1;
         for (index, &section) in fit.poles.sections.iter().enumerate() {
             for which in 0..section.order() {
-                let moved = section.times(which, f64::exp(SMALL));
                 let mut change = Column { first: 0, values: vec![0.0; self.rows()] };
                 for (record, (path, &first)) in paths.iter().zip(&self.starts).enumerate() {
-                    let (after, before) = (path.response(moved), &responses[record][index]);
+                    let (after, before) = (&moved[record][column - 1 + which], &responses[record][index]);
                     let rows = &mut change.values[first..first + path.voltage.len()];
                     for part in 0..section.order() {
                         let [by_force, by_start] = [shared + column + part, record * own + column + part]
@@ -514,7 +533,7 @@ impl Problem {
             column += section.order();
         }
         if !self.bounds.whole_rows {
-            let change = self.change_by_delay(&fit, shared, &paths, &responses);
+            let change = self.change_by_delay(&fit, shared, paths, responses);
             fit.basis.add(self.weighted(change));
         }
         fit
@@ -532,8 +551,9 @@ impl Problem {
                 add_difference(rows, factor(0), &path.voltage, &paths[record].voltage);
             }
             let mut column = 1;
+            let delayed = path.responses(&fit.poles.sections);
             for (index, &section) in fit.poles.sections.iter().enumerate() {
-                let (after, before) = (path.response(section), &responses[record][index]);
+                let (after, before) = (&delayed[index], &responses[record][index]);
                 for part in 0..section.order() {
                     add_difference(rows, factor(column + part), &after.forced[part], &before.forced[part]);
                 }
@@ -545,7 +565,8 @@ impl Problem {
 
     /// Refines denominator and delay by at most `most` steps, until a step promises to reduce the cost by less than `least` of it.
     pub fn refined(&self, poles: Poles, most: usize, least: f64) -> Fit {
-        let mut fit = self.linearised(poles);
+        let mut paths = Rc::new(self.paths(poles.delay));
+        let mut fit = self.linearised_on(&paths, poles);
         let (mut damping, mut rejected) = (1e-3, 0);
         let floor = 1e-28 * self.power();
         for _ in 0..most {
@@ -561,12 +582,16 @@ impl Problem {
                 break;
             }
             let poles = self.moved(&fit.poles, &step);
-            // Without its columns, and those of the last fit: of many rows they are large.
-            let Fit { poles, cost, .. } = self.fit(poles);
-            if cost < fit.cost {
-                let little = fit.cost - cost <= least * fit.cost;
+            let same_delay = poles.delay == fit.poles.delay;
+            let delayed = if same_delay { paths.clone() } else { Rc::new(self.paths(poles.delay)) };
+            let responses = self.responses(&delayed, &poles.sections);
+            let there = self.fitted(&delayed, &responses, poles);
+            if there.cost < fit.cost {
+                let little = fit.cost - there.cost <= least * fit.cost;
+                // Of many rows the columns of the last fit are large.
                 drop(fit);
-                fit = self.linearised(poles);
+                fit = self.with_derivatives(there, &delayed, &responses);
+                paths = delayed;
                 (damping, rejected) = (0.1 * damping, 0);
                 if little {
                     break;

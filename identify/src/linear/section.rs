@@ -28,18 +28,33 @@ pub enum Section {
     },
 }
 
+/// Sections that are solved together: each waits for its own last state, so that a processor solves several in the time of one.
+pub(super) const TOGETHER: usize = 4;
+
+/// A number of each of these sections.
+pub(super) type Each = [f64; TOGETHER];
+
+/// States of the sections: `w` and `v`; `v` stays 0 in a lag.
+pub(super) type States = [Each; 2];
+
 /// Exact transition over one interval: `x(t + h) = x_u(t + h) + phi (x(t) - x_u(t))` with the particular solution `x_u` under a
 /// voltage that is linear in time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transition {
     /// First row of the transition matrix; the second is `(-phi[1], phi[2])`.
-    phi: [f64; 3],
+    phi: [Each; 3],
     /// Length of the interval.
     length: f64,
 }
 
-/// State of a section: `w` and `v`; `v` stays 0 in a lag.
-pub(super) type State = [f64; 2];
+/// How sections move with a voltage that has been linear for ever.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Following {
+    /// Time by which `w` lags behind the voltage.
+    lag: Each,
+    /// Ratio of the voltage's slope and `v`; infinite for a lag, which has no `v`.
+    frequency: Each,
+}
 
 impl Section {
     /// A factor of second order with the poles of two lags.
@@ -96,42 +111,69 @@ impl Section {
         }
     }
 
-    /// The transition over an interval.
-    pub(super) fn over(self, length: f64) -> Transition {
-        let phi = match self {
+    /// First row of the transition matrix over an interval.
+    fn phi(self, length: f64) -> [f64; 3] {
+        match self {
             Self::First { tau } => [(-length / tau).exp(), 0.0, 0.0],
             Self::Second { frequency, damping } => {
                 let angle = frequency * length;
                 let (even, odd) = damped_pair(angle, damping);
                 [even + damping * odd, odd, even - damping * odd]
             }
-        };
-        Transition { phi, length }
-    }
-
-    /// State at which the section moves with a voltage that has been linear for ever: value and slope.
-    fn following(self, voltage: f64, slope: f64) -> State {
-        match self {
-            Self::First { tau } => [voltage - tau * slope, 0.0],
-            Self::Second { frequency, damping } => [voltage - 2.0 * damping / frequency * slope, slope / frequency],
         }
     }
+}
 
-    /// The state at the end of an interval over which the voltage starts at `voltage` and has the given slope.
+impl Following {
+    pub(super) fn of(sections: &[Section; TOGETHER]) -> Self {
+        let lag = sections.map(|section| match section {
+            Section::First { tau } => tau,
+            Section::Second { frequency, damping } => 2.0 * damping / frequency,
+        });
+        let frequency = sections.map(|section| match section {
+            Section::First { .. } => f64::INFINITY,
+            Section::Second { frequency, .. } => frequency,
+        });
+        Self { lag, frequency }
+    }
+
+    /// The states at the end of an interval over which the voltage starts at `voltage` and has the given slope.
     #[inline]
-    pub(super) fn step(self, over: &Transition, state: State, voltage: f64, slope: f64) -> State {
-        let start = self.following(voltage, slope);
-        let left = over.free([state[0] - start[0], state[1] - start[1]]);
-        [start[0] + slope * over.length + left[0], start[1] + left[1]]
+    pub(super) fn step(&self, over: &Transition, [w, v]: States, voltage: f64, slope: f64) -> States {
+        let (mut follows, mut left) = ([[0.0; TOGETHER]; 2], [[0.0; TOGETHER]; 2]);
+        for of in 0..TOGETHER {
+            follows[0][of] = voltage - self.lag[of] * slope;
+            follows[1][of] = slope / self.frequency[of];
+            left[0][of] = w[of] - follows[0][of];
+            left[1][of] = v[of] - follows[1][of];
+        }
+        left = over.free(left);
+        let change = slope * over.length;
+        for of in 0..TOGETHER {
+            left[0][of] += follows[0][of] + change;
+            left[1][of] += follows[1][of];
+        }
+        left
     }
 }
 
 impl Transition {
-    /// The state at the end of an interval without a voltage.
+    /// The transition of each section over an interval.
+    pub(super) fn of(sections: &[Section; TOGETHER], length: f64) -> Self {
+        let each = sections.map(|section| section.phi(length));
+        Self { phi: std::array::from_fn(|entry| each.map(|phi| phi[entry])), length }
+    }
+
+    /// The states at the end of an interval without a voltage.
     #[inline]
-    pub(super) fn free(&self, [w, v]: State) -> State {
-        let [ww, wv, vv] = self.phi;
-        [ww * w + wv * v, vv * v - wv * w]
+    pub(super) fn free(&self, [w, v]: States) -> States {
+        let [ww, wv, vv] = &self.phi;
+        let mut states = [[0.0; TOGETHER]; 2];
+        for of in 0..TOGETHER {
+            states[0][of] = ww[of] * w[of] + wv[of] * v[of];
+            states[1][of] = vv[of] * v[of] - wv[of] * w[of];
+        }
+        states
     }
 }
 
@@ -163,13 +205,16 @@ mod tests {
     fn transition_solves_the_differential_equation() {
         for (frequency, damping) in [(3.0, 0.02), (0.7, 0.999_999_9), (0.7, 1.0), (2.0, 1.3), (0.1, 30.0)] {
             let section = Section::Second { frequency, damping };
-            let slope_of = |[w, v]: State, u: f64| [frequency * v, frequency * (u - w - 2.0 * damping * v)];
+            let slope_of = |[w, v]: [f64; 2], u: f64| [frequency * v, frequency * (u - w - 2.0 * damping * v)];
             let (mut exact, length, parts) = ([0.3, -0.2], 1.7, 4000);
-            exact = section.step(&section.over(length), exact, 2.0, -0.8);
+            let together = [section; TOGETHER];
+            let over = Transition::of(&together, length);
+            let end = Following::of(&together).step(&over, exact.map(|of| [of; TOGETHER]), 2.0, -0.8);
+            exact = end.map(|each| each[TOGETHER - 1]);
             let (mut state, h) = ([0.3, -0.2], length / f64::from(parts));
             for part in 0..parts {
                 let u = |of: f64| 2.0 - 0.8 * h * (f64::from(part) + of);
-                let at = |state: State, k: State, of: f64| [state[0] + of * h * k[0], state[1] + of * h * k[1]];
+                let at = |state: [f64; 2], k: [f64; 2], of: f64| [state[0] + of * h * k[0], state[1] + of * h * k[1]];
                 let k1 = slope_of(state, u(0.0));
                 let k2 = slope_of(at(state, k1, 0.5), u(0.5));
                 let k3 = slope_of(at(state, k2, 0.5), u(0.5));

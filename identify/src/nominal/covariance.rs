@@ -8,6 +8,8 @@
 
 use std::f64::consts::PI;
 
+use rustfft::num_complex::Complex;
+
 use crate::stats::periodogram::powers;
 use crate::stats::sums::dot;
 
@@ -84,16 +86,16 @@ impl Spectrum {
             .iter()
             .enumerate()
             .map(|(at, power)| {
-                let angle = PI * at as f64 / half;
-                let (mut real, mut imaginary) = (1.0, 0.0);
-                for (lag, phi) in (1..).zip(&self.ar) {
-                    let (sin, cos) = (angle * f64::from(lag)).sin_cos();
-                    real -= phi * cos;
-                    imaginary += phi * sin;
+                let of_one_row = Complex::cis(PI * at as f64 / half);
+                let mut of_lag = of_one_row;
+                let mut filter = Complex::new(1.0, 0.0);
+                for phi in &self.ar {
+                    filter -= of_lag * phi;
+                    of_lag *= of_one_row;
                 }
                 // All but the first and the last frequency stand for two.
                 let times = if at == 0 || at as f64 == half { 1.0 } else { 2.0 };
-                times * power / (real * real + imaginary * imaginary)
+                times * power / filter.norm_sqr()
             })
             .sum();
         (self.innovations * sum / (2.0 * half)).sqrt()
