@@ -83,7 +83,7 @@ impl Step {
     }
 }
 
-/// What is run in two lanes: `build`, then `host`; beside them `beside`, then `built`, which starts what `build` has built.
+/// What is run in two lanes: `build`, then `host`; beside them `beside`. Both then share `built`, which starts what the lanes have built.
 pub(crate) struct Lanes {
     pub(crate) build: Step,
     pub(crate) host: &'static [Step],
@@ -100,7 +100,7 @@ impl Lanes {
     /// Runs every step. After the first that fails no other is begun.
     pub(crate) fn run(&self, progress: &Progress) -> Result<()> {
         let failed = AtomicBool::new(false);
-        let each = |steps: &[Step], run: fn(&Step) -> Result<()>| {
+        let each = |steps: &[Step], run: fn(&Step) -> Result<()>| -> Result<()> {
             for step in steps {
                 if failed.load(Ordering::Relaxed) {
                     break;
@@ -111,16 +111,27 @@ impl Lanes {
             Ok(())
         };
         let each = &each;
-        let (built, wait) = mpsc::channel();
-        // Its end without a message says that the build has failed.
+        // The next step of `built` is taken by the lane that is free first.
+        let taken = &AtomicUsize::new(0);
+        let share = move || {
+            while let Some(step) = self.built.get(taken.fetch_add(1, Ordering::Relaxed)) {
+                each(slice::from_ref(step), Step::run_beside)?;
+            }
+            Ok(())
+        };
+        let (has_built, wait_built) = mpsc::channel();
+        let (is_prepared, wait_prepared) = mpsc::channel();
+        // Where a lane ends without its message, it has failed.
         let host = move || {
             each(slice::from_ref(&self.build), Step::run)?;
-            let _ = built.send(());
-            each(self.host, Step::run)
+            let _ = has_built.send(());
+            each(self.host, Step::run)?;
+            if wait_prepared.recv().is_ok() { share() } else { Ok(()) }
         };
         let beside = move || {
             each(self.beside, Step::run_beside)?;
-            if wait.recv().is_ok() { each(self.built, Step::run_beside) } else { Ok(()) }
+            let _ = is_prepared.send(());
+            if wait_built.recv().is_ok() { share() } else { Ok(()) }
         };
         thread::scope(|scope| {
             let beside = scope.spawn(beside);

@@ -51,13 +51,14 @@ const LANES: Lanes = Lanes {
             ],
         ),
         Step::xtask("python", &["python", "--only", "test"]),
+        // The longest first, as both lanes share them at the end.
         Step::emulation("firmware", &["proof"]),
+        Step::emulation("story", &["story", "--check"]),
         // Of the images with 16 KB of RAM the one that needs most.
         Step::emulation("size", &["size", "--feedback", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("boot", &["boot"]),
         Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("clients", &["clients"]),
-        Step::emulation("story", &["story", "--check"]),
         Step::emulation("c library", &["capi"]),
     ],
 };

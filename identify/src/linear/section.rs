@@ -125,6 +125,7 @@ impl Section {
 }
 
 impl Following {
+    /// How each of these sections moves.
     pub(super) fn of(sections: &[Section; TOGETHER]) -> Self {
         let lag = sections.map(|section| match section {
             Section::First { tau } => tau,

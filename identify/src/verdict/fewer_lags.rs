@@ -9,10 +9,10 @@ use crate::fit::engine::{Engine, Fit};
 use crate::nominal::WORTHWHILE;
 
 /// Removes lags and oscillations of the relaxation as long as the held-out error, which `held_out` returns, stays within what a larger
-/// model is worth. A relaxation that is not fitted stays as it is.
+/// model is worth. Without causes, and where it is not fitted, the relaxation stays as it is.
 pub(super) fn with_fewer_lags(engine: &mut Engine, mut fit: Fit, held_out: impl Fn(&mut Engine, &Fit) -> f64) -> Fit {
     let mut least = None;
-    while !engine.budget().is_over() {
+    while !fit.model.blocks.is_empty() && !engine.budget().is_over() {
         let without = identified::without_each(&engine.base().relaxation, &fit.model.relaxation);
         let refit = |relaxation| engine.fit_twice(Model { relaxation, ..fit.model.clone() });
         let fits = without.into_iter().map(refit).collect::<Vec<_>>().into_iter();
