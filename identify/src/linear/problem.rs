@@ -6,7 +6,6 @@
 //! Kaufman's Jacobian).
 
 use std::ops::Range;
-use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -565,7 +564,7 @@ impl Problem {
 
     /// Refines denominator and delay by at most `most` steps, until a step promises to reduce the cost by less than `least` of it.
     pub fn refined(&self, poles: Poles, most: usize, least: f64) -> Fit {
-        let mut paths = Rc::new(self.paths(poles.delay));
+        let mut paths = self.paths(poles.delay);
         let mut fit = self.linearised_on(&paths, poles);
         let (mut damping, mut rejected) = (1e-3, 0);
         let floor = 1e-28 * self.power();
@@ -582,16 +581,16 @@ impl Problem {
                 break;
             }
             let poles = self.moved(&fit.poles, &step);
-            let same_delay = poles.delay == fit.poles.delay;
-            let delayed = if same_delay { paths.clone() } else { Rc::new(self.paths(poles.delay)) };
-            let responses = self.responses(&delayed, &poles.sections);
-            let there = self.fitted(&delayed, &responses, poles);
+            let delayed = (poles.delay != fit.poles.delay).then(|| self.paths(poles.delay));
+            let there_paths = delayed.as_ref().unwrap_or(&paths);
+            let responses = self.responses(there_paths, &poles.sections);
+            let there = self.fitted(there_paths, &responses, poles);
             if there.cost < fit.cost {
                 let little = fit.cost - there.cost <= least * fit.cost;
                 // Of many rows the columns of the last fit are large.
                 drop(fit);
-                fit = self.with_derivatives(there, &delayed, &responses);
-                paths = delayed;
+                fit = self.with_derivatives(there, there_paths, &responses);
+                paths = delayed.unwrap_or(paths);
                 (damping, rejected) = (0.1 * damping, 0);
                 if little {
                     break;
