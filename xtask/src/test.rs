@@ -51,7 +51,7 @@ const LANES: Lanes = Lanes {
             ],
         ),
         Step::xtask("python", &["python", "--only", "test"]),
-        // The longest first, as both lanes share them at the end.
+        // The long ones first, as both lanes share what is left at the end.
         Step::emulation("firmware", &["proof"]),
         Step::emulation("story", &["story", "--check"]),
         // Of the images with 16 KB of RAM the one that needs most.

@@ -199,9 +199,7 @@ impl Test {
         self.browser.set("target", "stair")?;
         self.browser.set("effect", "hysteresis")?;
         self.control()?;
-        self.browser.click("save-record")?;
-        let csv = self.browser.downloaded("record.csv")?;
-        self.write("record.csv", &csv)?;
+        self.save_record("record.csv")?;
         self.browser.click("diagnose-hidden")?;
         let page = self.found()?;
         same("diagnosis", &page, &self.command(&["diagnose", "record.csv"])?, CONVERGENCE)?;
@@ -210,6 +208,13 @@ impl Test {
         let text = self.browser.text("answer")?;
         ensure!(text.contains("hysteresis") && text.contains("width_v"), "the table shows {text}");
         Ok(())
+    }
+
+    /// Saves the record that the panel has made as a file of the command.
+    fn save_record(&mut self, name: &str) -> Result<()> {
+        self.browser.click("save-record")?;
+        let csv = self.browser.downloaded("record.csv")?;
+        self.write(name, &csv).map(drop)
     }
 
     /// Waits for the end of a diagnosis and returns its JSON.
@@ -225,9 +230,7 @@ impl Test {
     fn identified(&mut self) -> Result<()> {
         self.browser.set("effect", "static-nonlinearity")?;
         self.control()?;
-        self.browser.click("save-record")?;
-        let csv = self.browser.downloaded("record.csv")?;
-        self.write("curve.csv", &csv)?;
+        self.save_record("curve.csv")?;
         let file = self.folder.join("curve.csv");
         self.browser.choose("file", &file)?;
         self.browser.wait("document.getElementById('file-name').textContent.startsWith('curve')", CONTROL)?;
@@ -276,9 +279,7 @@ impl Test {
             self.browser.set("target", target)?;
             self.control()?;
             truths.push(self.browser.text("truth")?);
-            self.browser.click("save-record")?;
-            let csv = self.browser.downloaded("record.csv")?;
-            self.write(name, &csv)?;
+            self.save_record(name)?;
         }
         ensure!(truths[0] == truths[1], "not of one spring: {truths:?}");
         let file = self.folder.join(names[0]);
