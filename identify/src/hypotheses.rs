@@ -90,6 +90,9 @@ pub struct Coordinates {
     pub start: Option<FirstSpring>,
     /// Largest magnitude of the record's voltage, in normalised V.
     pub full_scale_v: f64,
+    /// Largest magnitude of the record's voltage and readings, in normalised V; 0 if it is not known.
+    #[serde(default)]
+    pub largest_v: f64,
     /// Voltage at which curves over the voltage begin, in normalised V.
     #[serde(default)]
     pub origin_v: f64,

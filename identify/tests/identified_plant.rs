@@ -97,3 +97,25 @@ fn a_diagnosis_of_an_identified_square_law_is_consistent() {
         }
     }
 }
+
+/// The curve that is reported is the settled one, in the reading's own zero and gain: where `x + 0.4 x^3 = u`.
+#[test]
+fn a_hardening_spring_is_a_static_nonlinearity_with_its_settled_curve() {
+    let hardening: Rates = |u, [x, v]| [v, 36.0 * (u - x - 0.4 * x.powi(3)) - 0.4 * 6.0 * v];
+    let record = record(hardening, |_, [x, _]| 1.0 + 2.0 * x, [-1.0, 1.0]);
+    let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+    let options = Options::default().judging(identified).unwrap();
+    let report = examine(&record, &options, |_| ()).unwrap().report;
+    let finding = &report.findings[0];
+    assert_eq!((finding.cause, report.findings.len()), ("static-nonlinearity", 1), "{report:#?}");
+    // Uniform noise of +-0.005.
+    assert!(report.extended.quality.held_out_rmse < 0.0035, "{report:#?}");
+    assert!(finding.parameters.len() > 3, "{:?}", finding.parameters);
+    for (name, parameter) in &finding.parameters {
+        let voltage: f64 = name.trim_start_matches("at_").trim_end_matches("_v").parse().unwrap();
+        let settled = (0..100).fold(0.0f64, |x, _| x - (x + 0.4 * x.powi(3) - voltage) / (1.0 + 1.2 * x * x));
+        let reading = 1.0 + 2.0 * settled;
+        assert!(parameter.low < reading && reading < parameter.high, "{name}: {reading}, {parameter:?}");
+        assert!(parameter.high - parameter.low < 0.03, "{name}: {parameter:?}");
+    }
+}

@@ -194,3 +194,35 @@ fn readings_that_were_lost_are_late_and_the_others_are_diagnosed() {
     assert!(cause == "delay" && report.findings.len() == 1 && report.rows == ROWS, "{report:?}");
     assert!((value(&report, "delay_s") - 0.1 * 0.4 / 0.6).abs() < 0.01, "{report:?}");
 }
+
+/// An outflow with the square root of the level, and a spring that gets stiffer: forces that are not linear in what is relaxed.
+#[test]
+fn restoring_force_that_is_not_linear_is_a_static_nonlinearity() {
+    for (seed, power) in [(17, 0.6), (18, 1.6)] {
+        let mut flowing = record(seed, |_, _| TAU_S, |_, stiffness| stiffness);
+        let mut random = uniform(seed + 10);
+        let mut level = 0.0f64;
+        for row in &mut flowing.rows {
+            let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+            row.measured = Some(level + noise);
+            for _ in 0..STEPS {
+                level +=
+                    (row.voltage_v - 500.0 * (level.max(0.0) / 500.0).powf(power)) * SAMPLE_S / STEPS as f64 / TAU_S;
+            }
+        }
+        let (cause, report) = first(&flowing);
+        let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+        assert!(cause == "static-nonlinearity" && report.verdict != Verdict::Unexplained, "{report:#?}");
+        // The level has no instantaneous part, the paper's spring has.
+        assert!(
+            causes.iter().all(|cause| ["static-nonlinearity", "instantaneous-share"].contains(cause)),
+            "{causes:?}"
+        );
+        assert!(report.extended.quality.held_out_rmse < 1.1, "{report:#?}");
+        for (name, parameter) in &report.findings[0].parameters {
+            let voltage: f64 = name.trim_start_matches("at_").trim_end_matches("_v").parse().unwrap();
+            let settled = 500.0 * (voltage / 500.0).powf(1.0 / power);
+            assert!((parameter.value - settled).abs() < 1.0, "{name}: {settled} V, {parameter:?}");
+        }
+    }
+}

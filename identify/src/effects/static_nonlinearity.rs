@@ -14,11 +14,15 @@
 //! never near 0 V, curve and voltage begin at the [origin](Data::origin_v), and the curve is fixed at both ends of the record's range.
 //!
 //! The curve is in front of the relaxation (Hammerstein model), or in some forms behind it (Wiener model), where `u` is
-//! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both.
+//! the relaxed value. The settled curve is the same; the instantaneous part and the speed of a step distinguish both. In other forms
+//! it is the restoring force over the stiffness (a [Lur'e system](crate::plant::restoring)): the settled curve is its inverse, and
+//! the relaxation is slower, or an oscillation lower, where the force rises less.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
+use crate::plant::law::Law;
+use crate::plant::restoring;
 use crate::plant::visited::Axis;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
@@ -38,19 +42,33 @@ enum Curve {
 }
 use Curve::{Exponential, Kink, Polynomial, Power, Uneven};
 
-/// Curve of each form, and whether it is behind the relaxation.
-const FORMS: [(Curve, bool); 11] = [
-    (Polynomial(1), false),
-    (Exponential, false),
-    (Polynomial(2), false),
-    (Polynomial(4), false),
-    (Polynomial(1), true),
-    (Exponential, true),
-    (Polynomial(2), true),
-    (Polynomial(4), true),
-    (Power, false),
-    (Kink, false),
-    (Uneven, false),
+/// Place of a curve.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    /// In front of the relaxation, over the voltage.
+    Before,
+    /// Behind the relaxation, over the relaxed stiffness.
+    Behind,
+    /// In the feedback of the relaxation: the restoring force over the stiffness.
+    Within,
+}
+use Place::{Before, Behind, Within};
+
+/// Curve of each form, and its place.
+const FORMS: [(Curve, Place); 13] = [
+    (Polynomial(1), Before),
+    (Exponential, Before),
+    (Polynomial(2), Before),
+    (Polynomial(4), Before),
+    (Polynomial(1), Behind),
+    (Exponential, Behind),
+    (Polynomial(2), Behind),
+    (Polynomial(4), Behind),
+    (Power, Before),
+    (Kink, Before),
+    (Uneven, Before),
+    (Polynomial(2), Within),
+    (Power, Within),
 ];
 
 /// Smallest `x` of a power, which may have no finite slope at 0.
@@ -73,24 +91,28 @@ const LEVELS: usize = 20;
 const ROWS_OF_LEVEL: f64 = 0.01;
 
 impl Curve {
-    /// Returns `f / u` at `x`, which is 1 at `fixed`.
-    fn secant(self, point: &[f64], x: f64, fixed: f64) -> f64 {
+    /// Returns `s` at `x`: `f / u` up to a factor, or for a polynomial up to a constant.
+    fn secant(self, point: &[f64], x: f64) -> f64 {
         match self {
             Exponential => {
                 let k = if point[0].abs() < 1e-6 { 1e-6 } else { point[0] };
-                let secant = |x: f64| if x < 1e-9 { k } else { -(-k * x).exp_m1() / x };
-                secant(x) / secant(fixed)
+                if x < 1e-9 { k } else { -(-k * x).exp_m1() / x }
             }
-            Power => (x.max(LEAST_OF_POWER) / fixed).powf(point[0] - 1.0),
+            Power => x.max(LEAST_OF_POWER).powf(point[0] - 1.0),
             Kink => {
                 let [place, slope] = [point[0], point[1]];
-                let secant = |x: f64| if x < place { slope } else { 1.0 + (slope - 1.0) * place / x };
-                secant(x) / secant(fixed).max(LEAST_OF_KINK)
+                if x < place { slope } else { 1.0 + (slope - 1.0) * place / x }
             }
-            Polynomial(_) | Uneven => {
-                let polynomial = |x: f64| x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient);
-                1.0 + polynomial(x) - polynomial(fixed)
-            }
+            Polynomial(_) | Uneven => x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient),
+        }
+    }
+
+    /// Returns `f / u` from `s` and its value where `f / u` is 1.
+    fn scaled(self, s: f64, fixed: f64) -> f64 {
+        match self {
+            Polynomial(_) | Uneven => 1.0 + s - fixed,
+            Kink => s / fixed.max(LEAST_OF_KINK),
+            Exponential | Power => s / fixed,
         }
     }
 
@@ -109,18 +131,30 @@ fn range_v(data: &Data) -> f64 {
     data.full_scale_v - data.origin_v.abs()
 }
 
-/// Returns `f / u` of a form at a voltage, both from the curve's origin.
-fn secant(form: usize, point: &[f64], voltage: f64, data: &Data) -> f64 {
-    let range_v = range_v(data);
-    let reference_v = if data.origin_v == 0.0 { REFERENCE_VOLTAGE_V } else { range_v };
-    let voltage = if matches!(FORMS[form].0, Uneven) { voltage } else { voltage.abs() };
-    FORMS[form].0.secant(point, voltage / range_v, reference_v / range_v)
-}
-
-/// Returns the slope of a curve just inside of the end of its range, both from the curve's origin.
-fn end_slope(curve: &impl Fn(f64) -> f64, end: f64) -> f64 {
-    let before = end * (1.0 - END_STEP);
-    (curve(end) - curve(before)) / (end - before)
+/// Returns a curve over the distance from its origin, up to the end of its range, beyond which it keeps its end slope: nothing shows
+/// it there. All in V.
+fn curve<'a>(form: usize, point: &'a [f64], data: &Data) -> impl Fn(f64) -> f64 + use<'a> {
+    let (curve, place) = FORMS[form];
+    let range_v = match place {
+        // An oscillation may reach more than it settles at.
+        Within => data.largest_v - data.origin_v.abs(),
+        Before | Behind => range_v(data),
+    };
+    let fixed = if data.origin_v == 0.0 { REFERENCE_VOLTAGE_V } else { range_v } / range_v;
+    let fixed = curve.secant(point, fixed);
+    let inside = move |above: f64| {
+        let x = if matches!(curve, Uneven) { above } else { above.abs() } / range_v;
+        above * curve.scaled(curve.secant(point, x), fixed)
+    };
+    move |above: f64| {
+        let end = above.clamp(-range_v, range_v);
+        if above == end {
+            return inside(above);
+        }
+        let before = end * (1.0 - END_STEP);
+        let slope = (inside(end) - inside(before)) / (end - before);
+        inside(end) + slope * (above - end)
+    }
 }
 
 /// Returns the number of levels of the voltage other than the curve's origin at which the record has rows.
@@ -169,21 +203,22 @@ impl Effect for StaticNonlinearity {
     }
 
     fn coordinates(&self, form: usize, _: &Data) -> Vec<Coordinate> {
-        match FORMS[form].0 {
-            Exponential => vec![Coordinate::new(-8.0, 8.0)],
-            Polynomial(1) => vec![Coordinate::new(-2.0, 2.0)],
-            Polynomial(coefficients) => vec![Coordinate::new(-100.0, 100.0); coefficients],
-            Uneven => vec![Coordinate::new(-2.0, 2.0); 2],
-            Power => vec![Coordinate::new(0.2, 5.0)],
-            Kink => vec![Coordinate::new(0.01, 0.95), Coordinate::new(0.0, 10.0)],
+        match FORMS[form] {
+            (Exponential, _) => vec![Coordinate::new(-8.0, 8.0)],
+            (Polynomial(1), _) => vec![Coordinate::new(-2.0, 2.0)],
+            (Polynomial(coefficients), Within) => vec![Coordinate::new(-10.0, 10.0); coefficients],
+            (Polynomial(coefficients), _) => vec![Coordinate::new(-100.0, 100.0); coefficients],
+            (Uneven, _) => vec![Coordinate::new(-2.0, 2.0); 2],
+            (Power, _) => vec![Coordinate::new(0.2, 5.0)],
+            (Kink, _) => vec![Coordinate::new(0.01, 0.95), Coordinate::new(0.0, 10.0)],
         }
     }
 
     /// A curve needs one level of the voltage more than it has parameters.
     fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
-        let (curve, behind) = FORMS[form];
+        let (curve, place) = FORMS[form];
         let levels = levels(context.data);
-        let unknown = behind && !context.data.estimates_any_start();
+        let unknown = place != Before && !context.data.estimates_any_start();
         if levels <= curve.coefficients() || unknown || matches!(curve, Uneven) && !has_both_signs(context.data) {
             return Vec::new();
         }
@@ -202,7 +237,7 @@ impl Effect for StaticNonlinearity {
                 // An S-shaped curve is zero at both ends and in the middle, so no gradient leads to it from a bend.
                 let s = |size: f64| start(&[-3.0 * size, 2.0 * size]);
                 let mut starts = vec![start(&[0.05]), start(&[-0.05])];
-                if coefficients > 1 {
+                if coefficients > 1 && place != Within {
                     starts.extend([s(0.1), s(-0.1)]);
                 }
                 starts
@@ -216,14 +251,19 @@ impl Effect for StaticNonlinearity {
         let step = data.full_scale_v * volt_v / f64::from(POINTS);
         let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
         let unit = 10f64.powi(-decimals);
-        let origin = data.origin_v;
-        let value = |voltage: f64| origin + (voltage - origin) * secant(form, point, voltage - origin, data);
+        let (origin, place) = (data.origin_v, FORMS[form].1);
+        let mut law = Law::of(None);
+        law.push(curve(form, point, data));
+        let value = |voltage: f64| match place {
+            Before | Behind => origin + law.at(voltage - origin),
+            Within => origin + restoring::at_force(&law, voltage - origin),
+        };
+        let axis = if place == Behind { Axis::Stiffness } else { Axis::Law };
         let at = |part: u32| {
             let voltage = (step / unit).round() * unit * f64::from(part);
             let name = format!("at_{voltage:.*}_v", decimals.max(0) as usize);
             let voltage = voltage / volt_v;
-            Quantity::new(name, Dimension::Stiffness, value(voltage))
-                .point_of_curve(if FORMS[form].1 { Axis::Stiffness } else { Axis::Law }, voltage)
+            Quantity::new(name, Dimension::Stiffness, value(voltage)).point_of_curve(axis, voltage)
         };
         (1..=POINTS).map(at).collect()
     }
@@ -234,22 +274,23 @@ impl Effect for StaticNonlinearity {
             (Uneven, _) => {
                 Some("fitted with a curve for each sign of the voltage, written for positive voltages".into())
             }
-            (_, behind) => behind.then(|| "fitted behind the relaxation, written before it".into()),
+            (_, Before) => None,
+            (_, Behind) => Some("fitted behind the relaxation, written before it".into()),
+            (_, Within) => {
+                Some("fitted as the relaxation's restoring force, its settled curve written before it".into())
+            }
         }
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let gain = chain.gain;
-        let law = if FORMS[form].1 { &mut chain.law_behind } else { &mut chain.law };
+        let law = match FORMS[form].1 {
+            Before => &mut chain.law,
+            Behind => &mut chain.law_behind,
+            Within => &mut chain.force,
+        };
         let origin = gain * data.origin_v;
-        let range_v = gain * range_v(data);
-        let value = move |above: f64| above * secant(form, point, above / gain, data);
-        law.push(move |voltage| {
-            let above = voltage - origin;
-            // Beyond the record's range, where nothing shows it, the curve keeps its end slope.
-            let within = above.max(-range_v).min(range_v);
-            let beyond = if above == within { 0.0 } else { end_slope(&value, within) * (above - within) };
-            origin + value(within) + beyond
-        });
+        let curve = curve(form, point, data);
+        law.push(move |value| origin + gain * curve((value - origin) / gain));
     }
 }

@@ -199,11 +199,17 @@ impl<'a> Engine<'a> {
 
     /// Returns the residual, and the cost of the initial state in nats.
     fn residual_and_start(&mut self, model: &Model) -> (Vec<f64>, f64) {
-        self.residual_and_start_by(model, |_| true)
+        let (residual, cost, _) = self.residual_and_start_by(model, |_| true);
+        (residual, cost)
     }
 
-    /// Returns the same with an initial state that is estimated from the rows that `counts` selects.
-    fn residual_and_start_by(&mut self, model: &Model, counts: impl Fn(usize) -> bool) -> (Vec<f64>, f64) {
+    /// Returns the same with an initial state that is estimated from the rows that `counts` selects, and the estimate of one in which the
+    /// prediction is not linear.
+    fn residual_and_start_by(
+        &mut self,
+        model: &Model,
+        counts: impl Fn(usize) -> bool,
+    ) -> (Vec<f64>, f64, Option<Start>) {
         let estimated = self.data.has_nuisances();
         if estimated {
             self.simulator.run_with_initial_states(model, &mut self.predicted, &mut self.kernels);
@@ -213,11 +219,12 @@ impl<'a> Engine<'a> {
         let observed = self.observed;
         let exact = |row: usize| counts(row) && observed.is_exact(row);
         if estimated && !self.simulator.is_linear_in_start() {
-            let Some(Start { start_v, residual, .. }) = self.start_by(model, exact) else {
-                return (self.residual_from_rest(model), 0.0);
+            let Some(start) = self.start_by(model, exact) else {
+                return (self.residual_from_rest(model), 0.0, None);
             };
-            let cost = initial_state::cost(&start_v, self.data.full_scale_v, residual.len());
-            return (residual, cost);
+            let residual = start.residual.clone();
+            let cost = initial_state::cost(&start.start_v, self.data.full_scale_v, residual.len());
+            return (residual, cost, Some(start));
         }
         let mut residual = self.residual_of_predicted();
         let initial_state_cost = match estimated {
@@ -226,7 +233,7 @@ impl<'a> Engine<'a> {
         };
         let states = if self.has_kernels() { self.kernels.len() as u64 } else { 0 };
         self.budget.spend(work::INITIAL_STATE * states * residual.len() as u64);
-        (residual, initial_state_cost)
+        (residual, initial_state_cost, None)
     }
 
     /// Returns true if the prediction has kernels besides the zero of each of several records.
@@ -400,16 +407,19 @@ impl<'a> Engine<'a> {
             *point = point.clamp(bound.lowest, bound.highest);
         }
         model.set_points(&points);
-        let mut residual = self.residual(&model);
+        let (mut residual, _, start) = self.residual_and_start_by(&model, |_| true);
+        let mut start = start.filter(|_| !self.data.is_joined());
+        let mut starts_here = start.is_some();
         let (mut noise, mut value) = law.rescaled(&residual, self.observed);
         let mut damping = 1e-3;
         let mut settled = false;
-        let mut start = None;
         for _ in 0..rounds {
             if self.budget.is_over() {
                 break;
             }
-            start = self.start_near(&model, start.as_ref());
+            if !starts_here {
+                start = self.start_near(&model, start.as_ref());
+            }
             let all = 0..points.len();
             let jacobian = self.jacobian_of(all, known, start.as_ref(), &model, &noise, &residual);
             if jacobian.places.is_empty() {
@@ -437,6 +447,7 @@ impl<'a> Engine<'a> {
                 let (noise_there, value_there) = law.rescaled(&there, self.observed);
                 if value_there > value {
                     gained = value_there - value;
+                    starts_here = false;
                     (points, model, residual, noise, value) = (moved, candidate, there, noise_there, value_there);
                     damping = (damping / 8.0).max(1e-9);
                     break;

@@ -12,6 +12,10 @@
 //!
 //! A parameter whose value is an end of what its bounds allow is marked as at a bound.
 //!
+//! Under a nominal spring that was identified from the same readings, zero and gain of the reading are estimated for each model. A
+//! point of a curve is then that of the reading: its gradient contains theirs, and its variance what they leave open at given
+//! coordinates.
+//!
 //! A parameter that only a search finds has the range that the search returns.
 
 use nalgebra::DMatrix;
@@ -22,6 +26,7 @@ use crate::effects::effect::{FitContext, Quantity};
 use crate::effects::model::{Block, Reported};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::normal_equations;
+use crate::fit::reading_map::ReadingMap;
 use crate::record::data::Data;
 use crate::stats::thresholds::probability::Z;
 
@@ -57,6 +62,7 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
     let covariance = covariance(engine, fit);
     let bounds = fit.model.coordinates(data);
     let places: Vec<usize> = (0..bounds.len()).filter(|&place| bounds[place].fitted).collect();
+    let reading = ReadingMap::of(engine, fit, &places);
     let mut start = 0;
     let mut found = Vec::new();
     for (of, (block, point)) in fit.model.blocks.iter().enumerate() {
@@ -64,7 +70,7 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
             let quantities = |point: &[f64]| block.effect().quantities(block.form, point, data);
             for Reported { index, quantity, extrapolated } in fit.model.reported(of, engine.base(), data) {
                 let Quantity { name, dimension, value, .. } = quantity;
-                let slope: Vec<f64> = places
+                let mut slope: Vec<f64> = places
                     .iter()
                     .map(|&place| {
                         if !(start..start + point.len()).contains(&place) {
@@ -76,11 +82,18 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
                         (quantities(&moved)[index].value - value) / step
                     })
                     .collect();
+                let mut reach = reach(block, point, data, index);
+                let (mut value, mut variance) = (value, 0.0);
+                if let Some(reading) = reading.as_ref().filter(|_| dimension == Dimension::Stiffness) {
+                    variance = reading.variance(value);
+                    slope.iter_mut().enumerate().for_each(|(of, slope)| *slope = reading.slope(of, value, *slope));
+                    value = reading.at(value);
+                    reach = (reading.at(reach.0), reading.at(reach.1));
+                }
                 let error = covariance.as_ref().map_or(f64::INFINITY, |matrix| {
                     let slope = nalgebra::DVector::from_vec(slope);
-                    (slope.transpose() * matrix * &slope)[(0, 0)].max(0.0).sqrt()
+                    ((slope.transpose() * matrix * &slope)[(0, 0)].max(0.0) + variance).sqrt()
                 });
-                let reach = reach(block, point, data, index);
                 let extrapolated_from_v = extrapolated.map(|range| [range.low, range.high]);
                 found.push((name, Parameter { extrapolated_from_v, ..interval(value, error, dimension, reach) }));
             }

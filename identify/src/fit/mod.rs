@@ -12,6 +12,7 @@ pub mod interval;
 pub mod known;
 pub mod leave_one_out;
 pub mod normal_equations;
+mod reading_map;
 pub mod simulator;
 mod start;
 pub mod stop;

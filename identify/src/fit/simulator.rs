@@ -270,8 +270,9 @@ impl<'a> Simulator<'a> {
             self.work += (1.0 + IRREGULAR * self.irregular) * INITIAL_STATE * self.signal.len() as f64;
         } else {
             self.signal.clone_from(&self.static_response.value);
-            chain.relax(&mut self.signal, &self.amplified.value, start, &mut self.levels_v);
-            self.work += chain.work(&self.signal, self.irregular);
+            let (applied, from_rest) = (&self.amplified.value, Some(&self.chained.value));
+            let simulated = chain.relax(&mut self.signal, applied, start, &mut self.levels_v, from_rest);
+            self.work += simulated * chain.work(&self.signal, self.irregular);
         }
         for (block, point) in &model.blocks {
             block.effect().modify_response(block.form, point, &mut self.signal, start);
@@ -301,7 +302,8 @@ impl<'a> Simulator<'a> {
                 self.work += STATIC_RESPONSE * self.static_response.value.len() as f64;
             }
             signal.clone_from(&self.static_response.value);
-            chain.relax(signal, &self.amplified.value, &mut InitialState::at_rest(), &mut self.levels_v);
+            let applied = &self.amplified.value;
+            chain.relax(signal, applied, &mut InitialState::at_rest(), &mut self.levels_v, None);
             self.linear_in_start = chain.is_linear_in_start();
             self.work += chain.work(signal, self.irregular);
         }

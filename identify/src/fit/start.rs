@@ -95,15 +95,6 @@ impl Engine<'_> {
         found
     }
 
-    /// Returns zero, in V, and gain of the reading relative to those of the nominal spring at a model, if that was identified from the
-    /// same readings.
-    pub fn reading_map(&mut self, model: &Model) -> Option<[f64; 2]> {
-        let full_scale_v = self.data.full_scale_v;
-        let start = self.start(model).filter(|_| self.data.normalisation.identified)?;
-        let &[.., zero_v, gain_v] = start.start_v.as_slice() else { return None };
-        Some([zero_v, 1.0 + gain_v / full_scale_v]).filter(|[zero_v, gain]| zero_v.is_finite() && gain.is_normal())
-    }
-
     /// Returns reading minus prediction of each row, in V, from a given initial state.
     pub(super) fn residual_from(&mut self, model: &Model, start_v: &[f64]) -> Vec<f64> {
         self.simulator.run_from(model, start_v, &mut self.predicted);

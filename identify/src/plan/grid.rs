@@ -68,10 +68,12 @@ impl Grid {
             rows.push(row(read, voltage_v, Some(0.0)));
         }
         let record = Record { name: String::new(), rows };
-        let Coordinates { full_scale_v, origin_v, sample_s, uniform, .. } = *coordinates;
+        let Coordinates { full_scale_v, largest_v, origin_v, sample_s, uniform, .. } = *coordinates;
+        let largest_v = largest_v.max(full_scale_v);
         let data = Data::thinned(&record, Input::Hold, 1, &normalisation(coordinates));
         // The points of the models are relative to the first record, and the spring is at rest at the start.
-        Data { full_scale_v, origin_v, record_sample_s: sample_s, uniform, initial_state_unknown: false, ..data }
+        let initial_state_unknown = false;
+        Data { full_scale_v, largest_v, origin_v, record_sample_s: sample_s, uniform, initial_state_unknown, ..data }
     }
 }
 

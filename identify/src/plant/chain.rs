@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! command -> limit -> slew -> output lag -> delay -> (magnitude) -> friction under load -> hysteresis -> law -> leakage
-//! -> relaxation -> lags in series -> play -> output law -> stiffness
+//! -> relaxation under its restoring force -> lags in series -> play -> output law -> stiffness
 //! ```
 //!
-//! A plant file cannot hold a law behind the relaxation; it is written in front of it, where it settles at the same
-//! stiffness.
+//! A plant file cannot hold a law behind the relaxation or in its feedback; it is written in front of it, where it settles at the
+//! same stiffness.
 //!
 //! The chain starts as a plant file describes it, effects modify it, and the result is simulated and written to a plant
 //! file again: the model that is fitted is the model that is written. A second limit takes the lower value, a second
@@ -19,6 +19,7 @@ use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
 use crate::plant::relaxation::Relaxation;
+use crate::plant::restoring;
 use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
@@ -48,6 +49,8 @@ pub struct Chain<'a> {
     pub law: Law<'a>,
     /// Gain that the law contains: a curve is one of the signal divided by it.
     pub gain: f64,
+    /// Restoring force of the relaxation over the stiffness, both in V; the identity for a linear one.
+    pub force: Law<'a>,
     /// A second bank of play operators, behind the relaxation.
     pub memory_behind: PlayBank,
     /// A second static law, behind the relaxation.
@@ -86,6 +89,7 @@ impl<'a> Chain<'a> {
             friction: LoadFriction::new(0.0),
             law: Law::of(file.law.as_ref()),
             gain: 1.0,
+            force: Law::of(None),
             memory_behind: PlayBank::of(None),
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
@@ -108,7 +112,7 @@ impl<'a> Chain<'a> {
         }
         let (gain, relaxation, leakage) = self.as_plant_file_tables();
         let relaxation = relaxation.in_series_with(&self.series_s).unwrap_or(relaxation);
-        file.law = self.law.table(gain, &self.law_behind, visited);
+        file.law = self.law.table(gain, &self.settled_law(), self.known_law(visited));
         file.leakage = leakage;
         relaxation.extend(file);
     }
@@ -124,6 +128,18 @@ impl<'a> Chain<'a> {
         }
     }
 
+    /// Returns the law from the settled stiffness of the linear relaxation to that of the chain.
+    fn settled_law(&self) -> Law<'_> {
+        let mut law = Law::of(None);
+        if !self.force.is_identity() {
+            law.push(|settled| restoring::at_force(&self.force, settled));
+        }
+        if !self.law_behind.is_identity() {
+            law.push(|stiffness| self.law_behind.at(stiffness));
+        }
+        law
+    }
+
     /// Returns true if a plant file can hold the lags in series.
     pub fn series_lags_fit_plant_file(&self) -> bool {
         self.as_plant_file_tables().1.in_series_with(&self.series_s).is_some()
@@ -131,7 +147,8 @@ impl<'a> Chain<'a> {
 
     /// Returns true if the response to the initial state depends on the settled stiffness.
     pub fn initial_state_depends_on_voltage(&self) -> bool {
-        self.memory.table().is_some() || self.relaxation.varies() || self.relaxation.falling_tau_s.is_some()
+        let linear = self.relaxation.is_linear() && self.force.is_identity();
+        self.memory.table().is_some() || !linear
     }
 
     /// Returns true if the stiffness is linear in the initial state: not where a law, a play operator or the time constant depends on
@@ -139,16 +156,20 @@ impl<'a> Chain<'a> {
     pub fn is_linear_in_start(&self) -> bool {
         let relaxation = &self.relaxation;
         let by_state = relaxation.varies() && relaxation.by_state.is_some();
-        let linear_relaxation = !by_state && relaxation.falling_tau_s.is_none();
+        let linear_relaxation = !by_state && relaxation.falling_tau_s.is_none() && self.force.is_identity();
         linear_relaxation && self.law_behind.is_identity() && self.memory_behind.table().is_none()
     }
 
     /// Returns the work of the linear part on a signal, in units of one lag; `irregular` is the fraction of its pieces that are not as
     /// long as the one before them.
     pub fn work(&self, signal: &Signal, irregular: f64) -> f64 {
+        let of = |relaxation: &Relaxation| match self.force.is_identity() {
+            true => relaxation.work(signal, irregular),
+            false => restoring::work(relaxation, signal),
+        };
         match self.exact_series() {
-            Some(relaxation) => relaxation.work(signal, irregular),
-            None => self.relaxation.work(signal, irregular) + (self.series_s.len() * signal.len()) as f64,
+            Some(relaxation) => of(&relaxation),
+            None => of(&self.relaxation) + (self.series_s.len() * signal.len()) as f64,
         }
     }
 
@@ -156,6 +177,7 @@ impl<'a> Chain<'a> {
     /// the next is not; `None` if there is none, also where a part of a loss bypasses the relaxation.
     fn exact_series(&self) -> Option<Relaxation> {
         let passes = self.losses.iter().all(|loss| loss.instantaneous == 0.0);
+        let passes = passes && self.force.is_identity();
         self.relaxation.in_series_with(&self.series_s).filter(|_| passes || self.series_s.is_empty())
     }
 
@@ -196,13 +218,23 @@ impl<'a> Chain<'a> {
     }
 
     /// Maps the settled stiffness to the stiffness, from an initial state. `applied` is the voltage on the electrodes; `levels_v`
-    /// receives its value in the middle of each piece if the time constant depends on the voltage.
-    pub fn relax(&self, signal: &mut Signal, applied: &Signal, start: &mut InitialState, levels_v: &mut Vec<f64>) {
+    /// receives its value in the middle of each piece if the time constant depends on the voltage. `other` is the stiffness from
+    /// another initial state, if that is known. Returns the part of the signal that was simulated, 0 to 1: less than 1 where the
+    /// initial state has decayed.
+    pub fn relax(
+        &self,
+        signal: &mut Signal,
+        applied: &Signal,
+        start: &mut InitialState,
+        levels_v: &mut Vec<f64>,
+        other: Option<&Signal>,
+    ) -> f64 {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(levels_v);
         }
         self.add_from_before(applied, signal, start);
-        self.follow(signal, start, levels_v);
+        let is_last = self.memory_behind.table().is_none() && self.law_behind.is_identity();
+        let simulated = self.follow(signal, start, levels_v, other.filter(|_| is_last && self.series_s.is_empty()));
         if self.memory_behind.table().is_some() {
             let mut memory = self.memory_behind.clone();
             signal.map(|stiffness| memory.at(stiffness));
@@ -210,6 +242,7 @@ impl<'a> Chain<'a> {
         if !self.law_behind.is_identity() {
             signal.map(|stiffness| self.law_behind.at(stiffness));
         }
+        simulated
     }
 
     /// Returns where on its curves the spring is under a command.
@@ -225,22 +258,33 @@ impl<'a> Chain<'a> {
         if self.relaxation.varies() && self.relaxation.by_state.is_none() {
             applied.middles(&mut levels_v);
         }
-        self.follow(&mut signal, &mut InitialState::at_rest(), &levels_v);
+        self.follow(&mut signal, &mut InitialState::at_rest(), &levels_v, None);
         Visited { voltage: Range::of(&applied), law, stiffness: Range::of(&signal) }
     }
 
     /// Returns the range of voltages over which a record shows the static law that is written to a plant file.
     pub fn known_law(&self, visited: &Visited) -> Range {
         let (gain, ..) = self.as_plant_file_tables();
-        self.law.known(gain, &self.law_behind, visited)
+        match self.law_behind.is_identity() {
+            true => visited.law,
+            false => self.law.known(|settled| restoring::at_force(&self.force, gain * settled), visited),
+        }
     }
 
-    /// Applies the linear part of the chain: leakage, relaxation and lags in series.
-    fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
+    /// Applies leakage, relaxation and lags in series. `other` is the stiffness from another initial state, if that is known. Returns the
+    /// part of the signal that was simulated, 0 to 1.
+    fn follow(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64], other: Option<&Signal>) -> f64 {
         let mut lost = InstantaneousLoss::default();
         self.losses.iter().for_each(|loss| loss.apply(signal, start, &mut lost));
         let exact = self.exact_series();
-        exact.as_ref().unwrap_or(&self.relaxation).pass(signal, start, levels_v);
+        let mut simulated = 1.0;
+        match exact.as_ref().unwrap_or(&self.relaxation) {
+            relaxation if self.force.is_identity() => relaxation.pass(signal, start, levels_v),
+            relaxation => {
+                let other = other.filter(|_| lost.is_none());
+                simulated = restoring::pass(relaxation, &self.force, signal, start, levels_v, other);
+            }
+        }
         if !lost.is_none() {
             lost.subtract_from(signal);
         }
@@ -250,6 +294,7 @@ impl<'a> Chain<'a> {
                 signal.pass(|piece| lag.pass(piece));
             }
         }
+        simulated
     }
 
     /// Replaces `signal` by the response of the stiffness to the initial state, where `applied` is the voltage on the electrodes, of a
@@ -263,7 +308,7 @@ impl<'a> Chain<'a> {
     ) {
         signal.silence_as(applied);
         self.add_from_before(applied, signal, start);
-        self.follow(signal, start, levels_v);
+        self.follow(signal, start, levels_v, None);
     }
 
     /// Adds to the settled stiffness what is left from the time before the first row: voltages that arrive delayed, and play operators

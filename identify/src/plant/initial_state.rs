@@ -112,10 +112,20 @@ impl Estimate {
 
     /// Subtracts from a change of the residual what the initial state takes over of it, its weights unchanged.
     pub(crate) fn follow(&self, change: &mut [f64], kernels: &[Vec<f64>]) {
+        subtract(&self.moved_by(change), kernels, change);
+    }
+
+    /// Returns the change of the offsets, in V, that follows a change of the residual, its weights unchanged.
+    pub(crate) fn moved_by(&self, change: &[f64]) -> Vec<f64> {
         let counted: Vec<f64> = self.rows.iter().map(|&row| change[row]).collect();
-        let mut start = DVector::from_iterator(kernels.len(), self.weighted.iter().map(|of| dot(of, &counted)));
+        let mut start = DVector::from_iterator(self.weighted.len(), self.weighted.iter().map(|of| dot(of, &counted)));
         self.normal.solve_mut(&mut start);
-        subtract(start.as_slice(), kernels, change);
+        start.as_slice().to_vec()
+    }
+
+    /// Returns the covariance of the offsets, in V^2, under independent noise of standard deviation `scale_v`, in V.
+    pub(crate) fn covariance(&self, scale_v: f64) -> DMatrix<f64> {
+        self.normal.inverse() * scale_v.powi(2)
     }
 }
 

@@ -47,29 +47,26 @@ impl<'a> Law<'a> {
         self.table.map_or(voltage, |table| straight(&table.voltage_v, &table.stiffness, voltage))
     }
 
-    /// Returns the range of voltages over which a record shows this law multiplied by `gain` and followed by the law `behind`, which
-    /// it shows over the relaxed stiffness only.
-    pub fn known(&self, gain: f64, behind: &Law, visited: &Visited) -> Range {
+    /// Returns the range of voltages over which a record shows this law followed by a law behind the relaxation, which it shows over the
+    /// relaxed stiffness only. `settled` is the stiffness at which the relaxation settles for a result of this law, both in V.
+    pub fn known(&self, settled: impl Fn(f64) -> f64, visited: &Visited) -> Range {
         let Range { low, high } = visited.law;
-        if behind.is_identity() {
-            return visited.law;
-        }
         let mut voltages = (1..=STEPS).rev().map(|step| high * step as f64 / STEPS as f64);
-        let reached = voltages.find(|voltage| (gain * self.at(*voltage)).abs() <= visited.stiffness.high);
+        let reached = voltages.find(|voltage| settled(self.at(*voltage)).abs() <= visited.stiffness.high);
         Range { low, high: reached.unwrap_or(high) }
     }
 
     /// Returns the table for a plant file, of this law multiplied by `gain` and followed by the law `behind`; `None` for the identity.
     ///
-    /// It is taken where a record has been. Above, the law that follows the file's own table continues with its end slope; below, it
+    /// It is taken in the range that is `known`. Above, the law that follows the file's own table continues with its end slope; below, it
     /// is straight to 0 V, where every table begins.
-    pub fn table(&self, gain: f64, behind: &Law, visited: &Visited) -> Option<plant_file::Law> {
+    pub fn table(&self, gain: f64, behind: &Law, known: Range) -> Option<plant_file::Law> {
         if self.behind.is_empty() && gain == 1.0 && behind.is_identity() {
             return self.table.cloned();
         }
         let first = |voltage: f64| self.first(voltage);
         let inner = |first: f64| gain * self.behind.iter().fold(first, |value, law| law(value));
-        let Range { low, high } = self.known(gain, behind, visited);
+        let Range { low, high } = known;
         let high = if high > 0.0 { high } else { REFERENCE_VOLTAGE_V };
         let step = high / STEPS as f64;
         // Straight beyond the range as a function of the file's own table, which is known there.

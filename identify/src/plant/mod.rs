@@ -16,4 +16,5 @@ pub mod leakage;
 pub mod load_friction;
 pub mod play_bank;
 pub mod relaxation;
+pub mod restoring;
 pub mod visited;

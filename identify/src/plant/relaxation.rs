@@ -188,59 +188,28 @@ impl Relaxation {
     /// Maps the settled stiffness to the stiffness. `levels_v` is the voltage across the spring in the middle of each
     /// piece, in V; it is needed only if the time constant depends on it.
     pub fn pass(&self, signal: &mut Signal, start: &mut InitialState, levels_v: &[f64]) {
-        let before = signal.before;
-        let (share, main) = (self.share, self.first_weight());
-        let mut at_first = |tau_s| Lag::at(tau_s, before + start.next_offset_v());
-        let mut lag = at_first(self.tau_s);
-        let mut further: Vec<(f64, Lag)> = self.parts().map(|it| (it.part, at_first(it.tau_s))).collect();
-        let at_first = |mode: Mode| {
-            let omega = TAU * mode.freq_hz;
-            let (x, rate) = (before + start.next_offset_v(), omega * start.next_offset_v());
-            (mode, Oscillator::at(omega, mode.zeta, x, rate))
-        };
-        let mut modes: Vec<(Mode, Oscillator)> = self.oscillations().map(at_first).collect();
+        let mut running = Running::at(self, signal.before, start);
         let free = signal.is_zero();
-        if self.is_linear() || free && lag.value() == 0.0 {
-            let mut lags = further;
-            lags.push((main, lag));
+        if self.is_linear() || free && running.lag.value() == 0.0 {
+            let Running { first_weight, lag, lags, oscillations, .. } = running;
+            let mut lags: Vec<(f64, Lag)> = lags.into_iter().filter(|(part, _)| *part != 0.0).collect();
+            lags.push((first_weight, lag));
+            let mut modes: Vec<_> = oscillations.into_iter().filter(|(mode, _)| contributes(mode)).collect();
             if free {
                 // Of an initial state only what it moves is simulated.
                 lags.retain(|(_, lag)| lag.value() != 0.0);
                 modes.retain(|(_, oscillator)| !oscillator.is_zero());
             }
-            return pass_all(signal, share, &lags, modes, free);
+            return pass_all(signal, self.share, &lags, modes, free);
         }
-        let by_state = self.by_state.filter(|_| self.varies());
-        let mut levels = levels_v.iter().copied().filter(|_| self.varies() && by_state.is_none());
-        let mut level = f64::NAN;
-        signal.pass(|piece: Piece| {
-            if let Some(next) = levels.next()
-                && next != level
-            {
-                level = next;
-                lag = lag.with_tau(self.tau_at(level));
-            }
-            if let Some(falling_s) = self.falling_tau_s {
-                let tau_s = if piece.from + piece.to < 2.0 * lag.value() { falling_s } else { self.tau_s };
-                lag = if tau_s == lag.tau_s() { lag } else { lag.with_tau(tau_s) };
-            }
-            let (start, end) = match by_state {
-                Some(instantaneous) => self.follow_state(instantaneous, &mut lag, piece),
-                None => lag.pass(piece),
-            };
-            let (mut from, mut to) = (share * piece.from + main * start, share * piece.to + main * end);
-            for (part, lag) in &mut further {
-                let (start, end) = lag.pass(piece);
-                from += *part * start;
-                to += *part * end;
-            }
-            for (mode, oscillator) in &mut modes {
-                let (start, end) = contribution(mode, oscillator, piece);
-                from += start;
-                to += end;
-            }
-            (from, to)
-        });
+        let mut levels = self.levels(levels_v);
+        signal.pass(|piece| running.pass(piece, levels.next()));
+    }
+
+    /// Returns the voltages in the middle of the pieces that set the time constant, in V; none if it does not depend on them.
+    pub fn levels(&self, levels_v: &[f64]) -> impl Iterator<Item = f64> {
+        let depends = self.varies() && self.by_state.is_none();
+        levels_v.iter().copied().filter(move |_| depends)
     }
 
     /// Returns the number of steps of all lags over all pieces of a signal, of which a fraction is `irregular`: not as long as the piece
@@ -284,6 +253,98 @@ impl Relaxation {
     }
 }
 
+/// A relaxation in operation: the state of its lags and oscillations.
+#[derive(Clone, Copy, Debug)]
+pub struct Running {
+    relaxation: Relaxation,
+    first_weight: f64,
+    /// The first lag.
+    lag: Lag,
+    /// Voltage that has set its time constant, in V; NaN before the first.
+    level_v: f64,
+    /// The further lags, each with its weight; unused ones have none.
+    lags: [(f64, Lag); FURTHER],
+    /// The oscillations; unused ones have no weight.
+    oscillations: [(Mode, Oscillator); PlantFile::MOST_MODES],
+}
+
+impl Running {
+    /// Returns a relaxation at rest at a settled stiffness, in V, but for the offsets of an initial state.
+    pub fn at(relaxation: &Relaxation, rest: f64, start: &mut InitialState) -> Self {
+        let mut at_rest =
+            |tau_s, is_used: bool| Lag::at(tau_s, if is_used { rest + start.next_offset_v() } else { 0.0 });
+        let lag = at_rest(relaxation.tau_s, true);
+        let lags = relaxation.further.map(|Part { part, tau_s }| (part, at_rest(tau_s, part != 0.0)));
+        let oscillations = relaxation.modes.map(|mode| {
+            let omega = TAU * mode.freq_hz;
+            let mut offset = || if contributes(&mode) { start.next_offset_v() } else { 0.0 };
+            let (x, rate) = (rest + offset(), omega * offset());
+            (mode, Oscillator::at(omega, mode.zeta, x, rate))
+        });
+        Self {
+            relaxation: *relaxation,
+            first_weight: relaxation.first_weight(),
+            lag,
+            level_v: f64::NAN,
+            lags,
+            oscillations,
+        }
+    }
+
+    /// Advances over one piece of the settled stiffness and returns the stiffness at its start and end, both in V. `level_v` is the
+    /// voltage that sets the time constant, in V, if it depends on that.
+    pub fn pass(&mut self, piece: Piece, level_v: Option<f64>) -> (f64, f64) {
+        let relaxation = &self.relaxation;
+        if let Some(level_v) = level_v
+            && level_v != self.level_v
+        {
+            self.level_v = level_v;
+            self.lag = self.lag.with_tau(relaxation.tau_at(level_v));
+        }
+        if let Some(falling_s) = relaxation.falling_tau_s {
+            let tau_s = if piece.from + piece.to < 2.0 * self.lag.value() { falling_s } else { relaxation.tau_s };
+            self.lag = if tau_s == self.lag.tau_s() { self.lag } else { self.lag.with_tau(tau_s) };
+        }
+        let (start, end) = match relaxation.by_state.filter(|_| relaxation.varies()) {
+            Some(instantaneous) => relaxation.follow_state(instantaneous, &mut self.lag, piece),
+            None => self.lag.pass(piece),
+        };
+        let share = relaxation.share;
+        let (mut from, mut to) =
+            (share * piece.from + self.first_weight * start, share * piece.to + self.first_weight * end);
+        for (part, lag) in self.lags.iter_mut().filter(|(part, _)| *part != 0.0) {
+            let (start, end) = lag.pass(piece);
+            from += *part * start;
+            to += *part * end;
+        }
+        for (mode, oscillator) in self.oscillations.iter_mut().filter(|(mode, _)| contributes(mode)) {
+            let (start, end) = contribution(mode, oscillator, piece);
+            from += start;
+            to += end;
+        }
+        (from, to)
+    }
+
+    /// Returns the stiffness at the end of the last piece, of `duration_s` s, if its settled stiffness had ended `more` higher than `to`
+    /// was reached with; all in V.
+    pub fn raised_end(&mut self, duration_s: f64, more: f64, to: f64) -> f64 {
+        let mut end = to + self.relaxation.share * more;
+        let mut raise = |weight: f64, lag: &mut Lag| {
+            let before = lag.value();
+            lag.raise_end(more);
+            end += weight * (lag.value() - before);
+        };
+        raise(self.first_weight, &mut self.lag);
+        self.lags.iter_mut().filter(|(part, _)| *part != 0.0).for_each(|(part, lag)| raise(*part, lag));
+        for (mode, oscillator) in self.oscillations.iter_mut().filter(|(mode, _)| contributes(mode)) {
+            let before = output(mode, oscillator);
+            oscillator.raise_end(duration_s, more);
+            end += output(mode, oscillator) - before;
+        }
+        end
+    }
+}
+
 /// Returns true if an oscillation contributes to the response.
 pub fn contributes(mode: &Mode) -> bool {
     mode.weight != 0.0 || mode.rate_weight != 0.0
@@ -291,9 +352,14 @@ pub fn contributes(mode: &Mode) -> bool {
 
 /// Returns what an oscillation contributes at start and end of a piece of its input.
 fn contribution(mode: &Mode, oscillator: &mut Oscillator, piece: Piece) -> (f64, f64) {
-    let rate = mode.rate_weight * oscillator.scaled_rate();
-    let (start, end) = oscillator.pass(piece);
-    (mode.weight * start + rate, mode.weight * end + mode.rate_weight * oscillator.scaled_rate())
+    let start = output(mode, oscillator);
+    oscillator.pass(piece);
+    (start, output(mode, oscillator))
+}
+
+/// Returns what an oscillation contributes at present.
+fn output(mode: &Mode, oscillator: &Oscillator) -> f64 {
+    mode.weight * oscillator.value() + mode.rate_weight * oscillator.scaled_rate()
 }
 
 /// Replaces a signal, which is 0 if `free`, by `share` of it and its responses of lags and oscillations.

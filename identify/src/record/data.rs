@@ -32,6 +32,8 @@ pub struct Data {
     pub command: Signal,
     /// Largest magnitude of the commanded voltage, in V.
     pub full_scale_v: f64,
+    /// Largest magnitude of the commanded voltage and of the readings, in V.
+    pub largest_v: f64,
     /// Voltage at which curves over the voltage begin, in V: 0, or that of the smallest magnitude if the nominal spring was identified
     /// from a record that is never near 0 V, where nothing shows the curve's part below.
     pub origin_v: f64,
@@ -95,6 +97,7 @@ impl Data {
             _ => all.into_iter().step_by(every).collect(),
         });
         let full_scale_v = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let largest_v = reading.iter().fold(full_scale_v, |most, reading| most.max(reading.abs()));
         let origin_v = if normalisation.identified { origin(&voltage_v) } else { 0.0 };
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let sample_s = median(&mut gaps).unwrap_or(1.0);
@@ -118,6 +121,7 @@ impl Data {
             reading,
             command,
             full_scale_v,
+            largest_v,
             origin_v,
             sample_s,
             record_sample_s,
@@ -147,12 +151,14 @@ impl Data {
         let alike = |data: &Data| data.uniform && (data.sample_s - sample_s).abs() < 0.01 * sample_s;
         let uniform = records.iter().all(alike);
         let full_scale_v = records.iter().fold(0.0, |most: f64, data| most.max(data.full_scale_v));
+        let largest_v = records.iter().fold(0.0, |most: f64, data| most.max(data.largest_v));
         let mut all = Data {
             time_s: Vec::new(),
             voltage_v: Vec::new(),
             reading: Vec::new(),
             command: records[0].command.clone(),
             full_scale_v,
+            largest_v,
             origin_v: 0.0,
             sample_s,
             record_sample_s,
@@ -171,7 +177,7 @@ impl Data {
             all.voltage_v.extend(&data.voltage_v);
             all.reading.extend(&data.reading);
             all.fold.extend(iter::repeat_n(fold as u8, data.rows()));
-            data = Data { full_scale_v, sample_s, record_sample_s, uniform, ..data };
+            data = Data { full_scale_v, largest_v, sample_s, record_sample_s, uniform, ..data };
             all.parts.push(Part { rows: first..first + data.rows(), shift_s, data });
         }
         all

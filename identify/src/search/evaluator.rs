@@ -2,7 +2,7 @@
 
 use crate::adequacy;
 use crate::effects::EFFECTS;
-use crate::effects::effect::{Effect, FitContext};
+use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
@@ -212,6 +212,12 @@ const WORK_PER_PIECE: u64 = 40_000;
 const STARTS_IF_SCARCE: usize = 16;
 /// Forms of [`Forms::Rare`] that are fitted, those with the largest predicted gains.
 const RARE_FORMS_FITTED: usize = 4;
+/// Smallest predicted gain of what is fitted beside one of these, relative to its own.
+const PART_OF_BEST: f64 = 0.1;
+/// Predicted gain of one of these, relative to its price, for which a search gets more work.
+const PROMISING_GAIN: f64 = 10.0;
+/// Predicted gain of one of these, relative to the largest of a common form, for which it is fitted with these.
+const FAR_ABOVE: f64 = 10.0;
 /// Work of a predicted gain for each row, in units of one piece of the voltage through one lag.
 const PREDICTION: u64 = 5;
 
@@ -228,67 +234,125 @@ struct Extension {
 fn extensions(
     engine: &mut Engine,
     fit: &Fit,
-    Breadth { exhaustive, forms: wanted_forms }: Breadth,
+    Breadth { exhaustive, forms }: Breadth,
     wanted: &dyn Fn(usize) -> bool,
     least: f64,
 ) -> Vec<Extension> {
-    let mut predictors = Vec::new();
-    let (autocorrelated, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
-    // The rounding error depends on the voltage, so that every effect would seem to explain it.
-    if !rounded && (exhaustive || !autocorrelated) {
-        predictors.push(GainPredictor::new(engine, fit, Noise::robust(&fit.residual)));
-    }
-    if autocorrelated || rounded {
-        predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
-    }
-    let sigma = robust_scale(&fit.residual);
-    // Where the voltage has many pieces, screening every start would leave no work for fits.
-    let dear = exhaustive && engine.budget().granted() < WORK_PER_PIECE * engine.data.command.len() as u64;
-    let scarce = engine.is_scarce() || dear;
-    let from_rest = engine.residual_from_rest(&fit.model);
-    let mut found: Vec<Extension> = Vec::new();
-    let allowed: Vec<(usize, &&dyn Effect)> =
-        EFFECTS.iter().enumerate().filter(|(index, effect)| wanted(*index) && engine.allows(effect.cause())).collect();
-    for (index, effect) in allowed {
-        let mut of_effect: Vec<Extension> = Vec::new();
-        let forms = match wanted_forms {
-            Forms::Common => 0..effect.common_forms(),
-            Forms::Rare => effect.common_forms()..effect.forms(),
-        };
-        for form in forms.clone() {
-            let block = Block { effect: index, form };
-            let scene = FitContext { data: engine.data, residual: &fit.residual, sigma };
-            let points = effect.initial_points(form, &scene);
-            let every = if scarce { points.len().div_ceil(STARTS_IF_SCARCE) } else { 1 };
-            let mut starts = Vec::new();
-            for point in points.into_iter().step_by(every.max(1)) {
-                if engine.is_over() {
-                    return Vec::new();
-                }
-                let there = engine.residual_from_rest(&fit.model.with(block, point.clone()));
-                let change: Vec<f64> = from_rest.iter().zip(&there).map(|(a, b)| a - b).collect();
-                engine.budget().spend(PREDICTION * change.len() as u64);
-                let predicted_gain =
-                    predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max);
-                starts.push(Extension { block, point, predicted_gain });
-            }
-            starts.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
-            // Two starts where the first may be a local maximum.
-            starts.truncate(1 + usize::from(starts.len() > 4 && forms.len() == 1));
-            of_effect.extend(starts);
+    let screening = Screening::new(engine, fit, exhaustive);
+    if forms == Forms::Rare {
+        let rare = rare(screening.extensions(engine, forms, wanted, least));
+        if rare.first().is_some_and(|it| is_promising(engine, it)) {
+            engine.budget().extend();
         }
-        if scarce {
-            of_effect.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
-            of_effect.truncate(1);
-        }
-        // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
-        if of_effect.iter().any(|extension| extension.predicted_gain > least) {
-            found.extend(of_effect);
-        }
+        return rare;
     }
-    if wanted_forms == Forms::Rare {
-        found.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
-        found.truncate(RARE_FORMS_FITTED);
+    let mut found = screening.extensions(engine, forms, wanted, least);
+    if exhaustive && fit.model.blocks.is_empty() {
+        // Before all common forms are fitted in vain.
+        let best = found.iter().map(|it| it.predicted_gain).fold(0.0, f64::max);
+        let mut rare = rare(screening.extensions(engine, Forms::Rare, wanted, least));
+        rare.retain(|it| it.predicted_gain > FAR_ABOVE * best && is_promising(engine, it));
+        if let Some(most) = rare.first().map(|it| it.predicted_gain) {
+            found.retain(|it| it.predicted_gain > PART_OF_BEST * most);
+            found.extend(rare);
+        }
     }
     found
+}
+
+/// The rare forms that are worth fitting, those with the largest predicted gains first.
+fn rare(mut found: Vec<Extension>) -> Vec<Extension> {
+    found.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+    found.truncate(RARE_FORMS_FITTED);
+    let best = found.first().map_or(0.0, |it| it.predicted_gain);
+    found.retain(|it| it.predicted_gain > PART_OF_BEST * best);
+    found
+}
+
+/// True if a form would gain many times its price.
+fn is_promising(engine: &Engine, it: &Extension) -> bool {
+    it.predicted_gain > PROMISING_GAIN * Evaluator::price(engine, &it.block)
+}
+
+/// Predicts the gains of what could be added to one fit.
+struct Screening<'f> {
+    fit: &'f Fit,
+    predictors: Vec<GainPredictor>,
+    from_rest: Vec<f64>,
+    sigma: f64,
+    exhaustive: bool,
+}
+
+impl<'f> Screening<'f> {
+    fn new(engine: &mut Engine, fit: &'f Fit, exhaustive: bool) -> Self {
+        let mut predictors = Vec::new();
+        let (autocorrelated, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
+        // The rounding error depends on the voltage, so that every effect would seem to explain it.
+        if !rounded && (exhaustive || !autocorrelated) {
+            predictors.push(GainPredictor::new(engine, fit, Noise::robust(&fit.residual)));
+        }
+        if autocorrelated || rounded {
+            predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
+        }
+        let from_rest = engine.residual_from_rest(&fit.model);
+        Self { fit, predictors, from_rest, sigma: robust_scale(&fit.residual), exhaustive }
+    }
+
+    /// The blocks in some of their forms, as [`extensions`] returns them.
+    fn extensions(
+        &self,
+        engine: &mut Engine,
+        wanted_forms: Forms,
+        wanted: &dyn Fn(usize) -> bool,
+        least: f64,
+    ) -> Vec<Extension> {
+        // Where the voltage has many pieces, screening every start would leave no work for fits.
+        let dear = self.exhaustive && engine.budget().granted() < WORK_PER_PIECE * engine.data.command.len() as u64;
+        let scarce = engine.is_scarce() || dear;
+        let mut found: Vec<Extension> = Vec::new();
+        let allowed =
+            EFFECTS.iter().enumerate().filter(|(index, effect)| wanted(*index) && engine.allows(effect.cause()));
+        for (index, effect) in allowed.collect::<Vec<_>>() {
+            let mut of_effect: Vec<Extension> = Vec::new();
+            let forms = match wanted_forms {
+                Forms::Common => 0..effect.common_forms(),
+                Forms::Rare => effect.common_forms()..effect.forms(),
+            };
+            for form in forms.clone() {
+                let block = Block { effect: index, form };
+                let scene = FitContext { data: engine.data, residual: &self.fit.residual, sigma: self.sigma };
+                let points = effect.initial_points(form, &scene);
+                let every = if scarce { points.len().div_ceil(STARTS_IF_SCARCE) } else { 1 };
+                let mut starts = Vec::new();
+                for point in points.into_iter().step_by(every.max(1)) {
+                    if engine.is_over() {
+                        return Vec::new();
+                    }
+                    let predicted_gain = self.predicted_gain(engine, block, &point);
+                    starts.push(Extension { block, point, predicted_gain });
+                }
+                starts.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+                // Two starts where the first may be a local maximum.
+                starts.truncate(1 + usize::from(starts.len() > 4 && forms.len() == 1));
+                of_effect.extend(starts);
+            }
+            if scarce {
+                of_effect.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
+                of_effect.truncate(1);
+            }
+            // Predicted gains rank the forms of an effect poorly: if one form is worth fitting, all are fitted.
+            if of_effect.iter().any(|extension| extension.predicted_gain > least) {
+                found.extend(of_effect);
+            }
+        }
+        found
+    }
+
+    /// Predicted gain of a block at a start, in nats.
+    fn predicted_gain(&self, engine: &mut Engine, block: Block, point: &[f64]) -> f64 {
+        let there = engine.residual_from_rest(&self.fit.model.with(block, point.to_vec()));
+        let change: Vec<f64> = self.from_rest.iter().zip(&there).map(|(a, b)| a - b).collect();
+        engine.budget().spend(PREDICTION * change.len() as u64);
+        self.predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max)
+    }
 }

@@ -83,6 +83,6 @@ fn tick_error(model: &Model, base: &Base, data: &Data, file: &PlantFile) -> Opti
     chain.memory = chain.memory.at_rest();
     let mut fitted = voltage.clone();
     chain.static_response(&mut fitted);
-    chain.relax(&mut fitted, &voltage, &mut InitialState::at_rest(), &mut Vec::new());
+    chain.relax(&mut fitted, &voltage, &mut InitialState::at_rest(), &mut Vec::new(), None);
     Some(fitted.at_rows().zip(&fixed).map(|(fitted, fixed)| (volt_v * fitted - fixed).abs()).fold(0.0, f64::max))
 }

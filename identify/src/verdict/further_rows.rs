@@ -17,6 +17,7 @@ impl Diagnosis {
         let mut data = Data::thinned(&normalisation.record(record), input, 1, normalisation);
         // Some parameters of the model are relative to the range of the record that it was fitted to.
         data.full_scale_v = self.data.full_scale_v / scales.volt_v;
+        data.largest_v = self.data.largest_v / scales.volt_v;
         data.origin_v = self.data.origin_v / scales.volt_v;
         let observed = Observed::new(&data);
         let mut engine = Engine::new(&data, &observed, &self.base);

@@ -174,6 +174,7 @@ fn coordinates(data: &Data, start: Option<FirstSpring>) -> Coordinates {
         even: data.normalisation.even,
         start,
         full_scale_v: data.full_scale_v,
+        largest_v: data.largest_v,
         origin_v: data.origin_v,
         sample_s: data.record_sample_s,
         uniform: data.uniform,

@@ -89,6 +89,7 @@ fn data(data: &mut Data, records: &[Record], normalisations: &[Normalisation]) {
     data.reading = rows().map(|(.., reading)| reading).collect();
     data.command = data.command.scaled(scales.second_s, scales.volt_v);
     data.full_scale_v *= scales.volt_v;
+    data.largest_v *= scales.volt_v;
     data.origin_v *= scales.volt_v;
     data.sample_s *= scales.second_s;
     data.record_sample_s *= scales.second_s;

@@ -86,6 +86,11 @@ impl Lag {
         }
         (start, self.value)
     }
+
+    /// Moves the output to where it would be if the last piece's input had ended `more` higher.
+    pub fn raise_end(&mut self, more: f64) {
+        self.value += self.factors[0].ramp * more;
+    }
 }
 
 /// The factors of each filter of a bank, as in [`Factors`].

@@ -48,6 +48,11 @@ impl Oscillator {
         self.x == 0.0 && self.rate == 0.0
     }
 
+    /// Returns the present output.
+    pub fn value(&self) -> f64 {
+        self.x
+    }
+
     /// Returns the present rate of change divided by the angular frequency, which has the unit of the output.
     pub fn scaled_rate(&self) -> f64 {
         self.rate / self.omega
@@ -73,6 +78,17 @@ impl Oscillator {
             self.rate = slope + NO_SUBNORMAL + step[1][0] * dx + step[1][1] * dv;
         }
         (start, self.x)
+    }
+
+    /// Moves the output to where it would be if the input of the last piece, of `duration_s` s, had ended `more` higher.
+    pub fn raise_end(&mut self, duration_s: f64, more: f64) {
+        if duration_s > 0.0 {
+            let slope = more / duration_s;
+            let lag = self.behind_s * slope;
+            let step = &self.transitions[0].matrix;
+            self.x += more - lag + step[0][0] * lag - step[0][1] * slope;
+            self.rate += slope + step[1][0] * lag - step[1][1] * slope;
+        }
     }
 }
 
