@@ -62,7 +62,11 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
     let covariance = covariance(engine, fit);
     let bounds = fit.model.coordinates(data);
     let places: Vec<usize> = (0..bounds.len()).filter(|&place| bounds[place].fitted).collect();
-    let reading = ReadingMap::of(engine, fit, &places);
+    let is_reading = |(block, point): &(Block, Vec<f64>)| {
+        let mut quantities = block.effect().quantities(block.form, point, data).into_iter();
+        block.effect == effect && quantities.any(|quantity| quantity.dimension == Dimension::Stiffness)
+    };
+    let reading = fit.model.blocks.iter().any(is_reading).then(|| ReadingMap::of(engine, fit, &places)).flatten();
     let mut start = 0;
     let mut found = Vec::new();
     for (of, (block, point)) in fit.model.blocks.iter().enumerate() {
