@@ -131,29 +131,37 @@ fn range_v(data: &Data) -> f64 {
     data.full_scale_v - data.origin_v.abs()
 }
 
-/// Returns a curve over the distance from its origin, up to the end of its range, beyond which it keeps its end slope: nothing shows
-/// it there. All in V.
-fn curve<'a>(form: usize, point: &'a [f64], data: &Data) -> impl Fn(f64) -> f64 + use<'a> {
-    let (curve, place) = FORMS[form];
-    let range_v = match place {
+/// Returns the range of a form's curve from its origin, in V.
+fn range_of_curve_v(form: usize, data: &Data) -> f64 {
+    match FORMS[form].1 {
         // An oscillation may reach more than it settles at.
         Within => data.largest_v - data.origin_v.abs(),
         Before | Behind => range_v(data),
-    };
+    }
+}
+
+/// Returns a curve over the distance from its origin, both in V.
+fn curve<'a>(form: usize, point: &'a [f64], data: &Data) -> impl Fn(f64) -> f64 + use<'a> {
+    let (curve, range_v) = (FORMS[form].0, range_of_curve_v(form, data));
     let fixed = if data.origin_v == 0.0 { REFERENCE_VOLTAGE_V } else { range_v } / range_v;
     let fixed = curve.secant(point, fixed);
-    let inside = move |above: f64| {
+    move |above: f64| {
         let x = if matches!(curve, Uneven) { above } else { above.abs() } / range_v;
         above * curve.scaled(curve.secant(point, x), fixed)
-    };
+    }
+}
+
+/// Returns the same with its end slope beyond the end of its range, where nothing shows it.
+fn continued<'a>(form: usize, point: &'a [f64], data: &Data) -> impl Fn(f64) -> f64 + use<'a> {
+    let (curve, range_v) = (curve(form, point, data), range_of_curve_v(form, data));
     move |above: f64| {
         let end = above.clamp(-range_v, range_v);
         if above == end {
-            return inside(above);
+            return curve(above);
         }
         let before = end * (1.0 - END_STEP);
-        let slope = (inside(end) - inside(before)) / (end - before);
-        inside(end) + slope * (above - end)
+        let slope = (curve(end) - curve(before)) / (end - before);
+        curve(end) + slope * (above - end)
     }
 }
 
@@ -252,11 +260,12 @@ impl Effect for StaticNonlinearity {
         let decimals = (1.0 - step.log10().floor()).clamp(-300.0, 300.0) as i32;
         let unit = 10f64.powi(-decimals);
         let (origin, place) = (data.origin_v, FORMS[form].1);
-        let mut law = Law::of(None);
-        law.push(curve(form, point, data));
+        let mut force = Law::of(None);
+        force.push(continued(form, point, data));
+        let curve = curve(form, point, data);
         let value = |voltage: f64| match place {
-            Before | Behind => origin + law.at(voltage - origin),
-            Within => origin + restoring::at_force(&law, voltage - origin),
+            Before | Behind => origin + curve(voltage - origin),
+            Within => origin + restoring::at_force(&force, voltage - origin),
         };
         let axis = if place == Behind { Axis::Stiffness } else { Axis::Law };
         let at = |part: u32| {
@@ -290,7 +299,7 @@ impl Effect for StaticNonlinearity {
             Within => &mut chain.force,
         };
         let origin = gain * data.origin_v;
-        let curve = curve(form, point, data);
+        let curve = continued(form, point, data);
         law.push(move |value| origin + gain * curve((value - origin) / gain));
     }
 }
