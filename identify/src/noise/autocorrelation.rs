@@ -36,6 +36,8 @@ const LARGEST_ORDER: usize = 50;
 const LARGEST_ORDER_WITH_DIFFERENCE: usize = 12;
 /// Ratio of the frequencies that one section spans.
 const SECTION_RATIO: f64 = 4.0;
+/// Number of sections of the fractional difference that share one pass over the rows.
+const TOGETHER: usize = 6;
 /// Number of rows that are whitened at a time.
 const BLOCK: usize = 8;
 /// Error of a likelihood that is computed from the spectrum, in nats.
@@ -100,22 +102,17 @@ impl Autocorrelation {
     /// Returns the innovations of a residual; all rows before the first are taken to have had its value.
     pub fn whitened(&self, residual: &[f64]) -> Vec<f64> {
         let mut rough = residual.to_vec();
-        // Input and output of each section at the previous row. All sections share one pass over the rows, so their
-        // operations overlap.
         let mut first = rough.first().copied().unwrap_or(0.0);
         let at_rest = |&(zero, pole): &(f64, f64)| {
             let before = first;
             let out = before * (1.0 - zero) / (1.0 - pole);
             first = before - zero * before + pole * out;
-            (before, out)
+            Section { zero, pole, before, out }
         };
-        let mut states: Vec<(f64, f64)> = self.sections.iter().map(at_rest).collect();
-        for value in &mut rough {
-            for (&(zero, pole), (before, out)) in self.sections.iter().zip(&mut states) {
-                *out = *value - zero * *before + pole * *out;
-                *before = std::mem::replace(value, *out);
-            }
-        }
+        let sections: Vec<Section> = self.sections.iter().map(at_rest).collect();
+        let (groups, rest) = sections.as_chunks::<TOGETHER>();
+        groups.iter().for_each(|group| pass(*group, &mut rough));
+        rest.iter().for_each(|section| pass([*section], &mut rough));
         if self.ar.is_empty() {
             return rough;
         }
@@ -135,6 +132,27 @@ impl Autocorrelation {
         }
         white.extend((white.len()..rough.len()).map(one));
         white
+    }
+}
+
+/// A section of the fractional difference, `out = value - zero before + pole out`, with its input and output at the row before.
+#[derive(Clone, Copy)]
+struct Section {
+    zero: f64,
+    pole: f64,
+    before: f64,
+    out: f64,
+}
+
+/// Replaces values by what some sections make of them one after the other. They share one pass over the rows, so their operations
+/// overlap; of a number that the compiler knows the states stay in registers.
+fn pass<const N: usize>(mut sections: [Section; N], values: &mut [f64]) {
+    for value in values {
+        for section in &mut sections {
+            let out = *value - section.zero * section.before + section.pole * section.out;
+            section.before = std::mem::replace(value, out);
+            section.out = out;
+        }
     }
 }
 

@@ -191,10 +191,8 @@ impl Relaxation {
         let mut running = Running::at(self, signal.before, start);
         let free = signal.is_zero();
         if self.is_linear() || free && running.lag.value() == 0.0 {
-            let Running { first_weight, lag, lags, oscillations, .. } = running;
-            let mut lags: Vec<(f64, Lag)> = lags.into_iter().filter(|(part, _)| *part != 0.0).collect();
+            let Running { first_weight, lag, mut lags, oscillations: mut modes, .. } = running;
             lags.push((first_weight, lag));
-            let mut modes: Vec<_> = oscillations.into_iter().filter(|(mode, _)| contributes(mode)).collect();
             if free {
                 // Of an initial state only what it moves is simulated.
                 lags.retain(|(_, lag)| lag.value() != 0.0);
@@ -254,7 +252,7 @@ impl Relaxation {
 }
 
 /// A relaxation in operation: the state of its lags and oscillations.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Running {
     relaxation: Relaxation,
     first_weight: f64,
@@ -262,23 +260,21 @@ pub struct Running {
     lag: Lag,
     /// Voltage that has set its time constant, in V; NaN before the first.
     level_v: f64,
-    /// The further lags, each with its weight; unused ones have none.
-    lags: [(f64, Lag); FURTHER],
-    /// The oscillations; unused ones have no weight.
-    oscillations: [(Mode, Oscillator); PlantFile::MOST_MODES],
+    /// The further lags, each with its weight.
+    lags: Vec<(f64, Lag)>,
+    /// The oscillations.
+    oscillations: Vec<(Mode, Oscillator)>,
 }
 
 impl Running {
     /// Returns a relaxation at rest at a settled stiffness, in V, but for the offsets of an initial state.
     pub fn at(relaxation: &Relaxation, rest: f64, start: &mut InitialState) -> Self {
-        let mut at_rest =
-            |tau_s, is_used: bool| Lag::at(tau_s, if is_used { rest + start.next_offset_v() } else { 0.0 });
-        let lag = at_rest(relaxation.tau_s, true);
-        let lags = relaxation.further.map(|Part { part, tau_s }| (part, at_rest(tau_s, part != 0.0)));
-        let oscillations = relaxation.modes.map(|mode| {
+        let mut at_rest = |tau_s| Lag::at(tau_s, rest + start.next_offset_v());
+        let lag = at_rest(relaxation.tau_s);
+        let lags = relaxation.parts().map(|it| (it.part, at_rest(it.tau_s))).collect();
+        let oscillations = relaxation.oscillations().map(|mode| {
             let omega = TAU * mode.freq_hz;
-            let mut offset = || if contributes(&mode) { start.next_offset_v() } else { 0.0 };
-            let (x, rate) = (rest + offset(), omega * offset());
+            let (x, rate) = (rest + start.next_offset_v(), omega * start.next_offset_v());
             (mode, Oscillator::at(omega, mode.zeta, x, rate))
         });
         Self {
@@ -287,7 +283,7 @@ impl Running {
             lag,
             level_v: f64::NAN,
             lags,
-            oscillations,
+            oscillations: oscillations.collect(),
         }
     }
 
@@ -312,12 +308,12 @@ impl Running {
         let share = relaxation.share;
         let (mut from, mut to) =
             (share * piece.from + self.first_weight * start, share * piece.to + self.first_weight * end);
-        for (part, lag) in self.lags.iter_mut().filter(|(part, _)| *part != 0.0) {
+        for (part, lag) in &mut self.lags {
             let (start, end) = lag.pass(piece);
             from += *part * start;
             to += *part * end;
         }
-        for (mode, oscillator) in self.oscillations.iter_mut().filter(|(mode, _)| contributes(mode)) {
+        for (mode, oscillator) in &mut self.oscillations {
             let (start, end) = contribution(mode, oscillator, piece);
             from += start;
             to += end;
@@ -335,8 +331,8 @@ impl Running {
             end += weight * (lag.value() - before);
         };
         raise(self.first_weight, &mut self.lag);
-        self.lags.iter_mut().filter(|(part, _)| *part != 0.0).for_each(|(part, lag)| raise(*part, lag));
-        for (mode, oscillator) in self.oscillations.iter_mut().filter(|(mode, _)| contributes(mode)) {
+        self.lags.iter_mut().for_each(|(part, lag)| raise(*part, lag));
+        for (mode, oscillator) in &mut self.oscillations {
             let before = output(mode, oscillator);
             oscillator.raise_end(duration_s, more);
             end += output(mode, oscillator) - before;

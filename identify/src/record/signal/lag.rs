@@ -71,6 +71,7 @@ impl Lag {
     }
 
     /// Advances over one piece of the input and returns the output at its start and end.
+    #[inline]
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.value;
         if self.factors[0].differ_from(duration_s) {

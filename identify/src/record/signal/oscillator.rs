@@ -59,6 +59,7 @@ impl Oscillator {
     }
 
     /// Advances over one piece of the input and returns the output at its start and end.
+    #[inline]
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.x;
         if duration_s > 0.0 {
