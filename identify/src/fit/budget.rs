@@ -67,7 +67,7 @@ const SCARCE: f64 = 0.5;
 const FOR_RARE_FORMS: f64 = 0.125;
 
 /// Ratio of the largest work on a record to the work that a diagnosis may do if nothing fits: the rest is for a diagnosis once a
-/// model leaves nothing but noise, or for the search of an equation (see [`Budget::left`]).
+/// model leaves nothing but noise or a rare form promises much, or for the search of an equation (see [`Budget::left`]).
 const EXTENSION: f64 = 1.15;
 
 /// Work that an effort allows for a record.
@@ -177,7 +177,7 @@ impl Budget {
     }
 
     /// Allows the present search more work, once: it has found a model that leaves nothing but noise, so that the work left is for
-    /// simpler models of the same record.
+    /// simpler models of the same record, or a rare form that promises much.
     pub fn extend(&self) {
         self.reserved.store(0, Ordering::Relaxed);
         if self.extended.swap(true, Ordering::Relaxed) {

@@ -73,7 +73,7 @@ impl Engine<'_> {
 
     /// Returns an estimate that ends with zero and gain; `None` if they are not estimated.
     fn start_with_reading_map(&mut self, model: &Model) -> Option<Start> {
-        self.start(model).filter(|_| self.data.normalisation.identified)
+        if self.data.normalisation.identified { self.start(model) } else { None }
     }
 }
 

@@ -174,10 +174,9 @@ impl<'a> Chain<'a> {
     }
 
     /// Returns a relaxation that is the chain's with all lags in series, which is exact where the output of one as the input of
-    /// the next is not; `None` if there is none, also where a part of a loss bypasses the relaxation.
+    /// the next is not; `None` if there is none, also where a part of a loss bypasses the relaxation or its restoring force is not linear.
     fn exact_series(&self) -> Option<Relaxation> {
-        let passes = self.losses.iter().all(|loss| loss.instantaneous == 0.0);
-        let passes = passes && self.force.is_identity();
+        let passes = self.force.is_identity() && self.losses.iter().all(|loss| loss.instantaneous == 0.0);
         self.relaxation.in_series_with(&self.series_s).filter(|_| passes || self.series_s.is_empty())
     }
 

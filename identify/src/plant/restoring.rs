@@ -51,14 +51,14 @@ pub fn pass(
     let mut levels = relaxation.levels(levels_v);
     let mut others = other.into_iter().flat_map(Signal::pieces);
     let (mut near, mut integrated) = (0, 0);
-    let pieces = signal.len().max(1) as f64;
+    let (pieces, rate) = (signal.len().max(1) as f64, fastest(relaxation));
     signal.pass(|piece| {
         let (level_v, other) = (levels.next(), others.next());
         if let Some(other) = other.filter(|_| near > PIECES_NEAR) {
             return (other.from, other.to);
         }
         integrated += 1;
-        let count = steps(relaxation, piece.duration_s);
+        let count = steps(rate, piece.duration_s);
         let slope = (piece.to - piece.from) / count;
         let duration_s = piece.duration_s / count;
         if relaxation.share != 0.0 && piece.from != input {
@@ -86,7 +86,8 @@ pub fn pass(
 
 /// Returns the work of a signal, in units of one lag.
 pub fn work(relaxation: &Relaxation, signal: &Signal) -> f64 {
-    signal.durations_s().map(|duration_s| WORK_OF_STEP * steps(relaxation, duration_s)).sum()
+    let rate = fastest(relaxation);
+    signal.durations_s().map(|duration_s| WORK_OF_STEP * steps(rate, duration_s)).sum()
 }
 
 /// Returns the stiffness at which the spring settles under a force, both in V: the inverse of an increasing restoring force that is 0 at 0.
@@ -107,12 +108,16 @@ pub fn at_force(force: &Law, settled: f64) -> f64 {
     high.copysign(settled)
 }
 
-/// Returns the number of integration steps of a piece.
-fn steps(relaxation: &Relaxation, duration_s: f64) -> f64 {
+/// Returns the largest rate of a lag or an oscillation, per s.
+fn fastest(relaxation: &Relaxation) -> f64 {
     let lags = relaxation.parts().map(|part| 1.0 / part.tau_s);
     let rates = lags.chain(relaxation.oscillations().map(|mode| TAU * mode.freq_hz));
-    let fastest = rates.fold(1.0 / relaxation.tau_s, f64::max);
-    (duration_s * fastest / STEP).ceil().clamp(1.0, MOST_STEPS)
+    rates.fold(1.0 / relaxation.tau_s, f64::max)
+}
+
+/// Returns the number of integration steps of a piece under the largest rate, per s.
+fn steps(rate: f64, duration_s: f64) -> f64 {
+    (duration_s * rate / STEP).ceil().clamp(1.0, MOST_STEPS)
 }
 
 #[cfg(test)]
@@ -135,12 +140,17 @@ mod tests {
         law
     }
 
-    /// Response at rows 0.1 s apart to a voltage that is 1 V from row 5 on.
-    fn response(relaxation: &Relaxation) -> Vec<f64> {
+    /// A voltage at rows 0.1 s apart that is 1 V from row 5 on.
+    fn step() -> Signal {
         let rows: String = (0..100).map(|row| format!("{},{}\n", 0.1 * f64::from(row), i32::from(row >= 5))).collect();
         let record = Record::parse("r", &format!("time_s,voltage_v\n{rows}"), "stiffness").unwrap();
         let times: Vec<f64> = record.rows.iter().map(|row| row.time_s).collect();
-        let mut signal = Signal::new(&Schedule::from_record(&record, Between::Hold), &times, 0.0);
+        Signal::new(&Schedule::from_record(&record, Between::Hold), &times, 0.0)
+    }
+
+    /// The response to it at its rows.
+    fn response(relaxation: &Relaxation) -> Vec<f64> {
+        let mut signal = step();
         pass(relaxation, &law(), &mut signal, &mut InitialState::at_rest(), &[], None);
         signal.at_rows().collect()
     }
@@ -198,6 +208,24 @@ mod tests {
         let exact = by_euler(|voltage, [y, v]| [v, omega * omega * (voltage - force(y)) - 2.0 * zeta * omega * v]);
         let apart = largest_difference(&response(&relaxation), &exact);
         assert!(apart < 5e-3, "{apart} V");
+    }
+
+    #[test]
+    fn response_from_another_state_ends_where_both_have_met() {
+        let relaxation = Relaxation::plain(0.1, 0.2);
+        let respond = |start_v: f64, other: Option<&Signal>| {
+            let mut signal = step();
+            let start = &mut InitialState::of(vec![start_v]);
+            let integrated = pass(&relaxation, &law(), &mut signal, start, &[], other);
+            (signal, integrated)
+        };
+        let (from_rest, _) = respond(0.0, None);
+        let [(whole, all), (ended, part)] = [None, Some(&from_rest)].map(|other| respond(0.5, other));
+        let rows = |signal: &Signal| signal.at_rows().collect::<Vec<f64>>();
+        let apart = largest_difference(&rows(&whole), &rows(&from_rest));
+        assert!(apart > 0.2, "{apart} V");
+        assert!(largest_difference(&rows(&whole), &rows(&ended)) < DECAYED_V);
+        assert!(all == 1.0 && (0.2..0.95).contains(&part), "{part}");
     }
 
     #[test]
