@@ -63,13 +63,17 @@ pub fn moved(relaxation: &Relaxation, mut values: impl Iterator<Item = f64>) -> 
 }
 
 /// Returns the [`coordinates`] without each of the further lags and oscillations that still have a weight: weights of 0 and the rest of
-/// them are kept in a fit. Empty without coordinates.
+/// them are kept in a fit. Beside an oscillation also with the first lag as feedthrough: as fast as it may be, with a share of 0 beside
+/// it. Empty without coordinates.
 pub fn without_each(relaxation: &Relaxation, coordinates: &[(Coordinate, f64)]) -> Vec<Vec<(Coordinate, f64)>> {
     let lags = relaxation.parts().map(|_| (2, 1));
     let oscillations = relaxation.oscillations().map(|_| (4, 2));
     let mut first = TIME_CONSTANT + 1;
     let mut without = Vec::new();
-    for (count, weights) in lags.chain(oscillations).take_while(|_| !coordinates.is_empty()) {
+    if coordinates.is_empty() {
+        return without;
+    }
+    for (count, weights) in lags.chain(oscillations) {
         let mut kept = coordinates.to_vec();
         let own = &mut kept[first..first + count];
         first += count;
@@ -78,6 +82,15 @@ pub fn without_each(relaxation: &Relaxation, coordinates: &[(Coordinate, f64)]) 
         }
         own.iter_mut().for_each(|(coordinate, _)| coordinate.fitted = false);
         own[count - weights..].iter_mut().for_each(|(_, weight)| *weight = 0.0);
+        without.push(kept);
+    }
+    let oscillates = moved(relaxation, coordinates.iter().map(|(_, value)| *value)).oscillations().next().is_some();
+    if oscillates && coordinates[TIME_CONSTANT].0.fitted {
+        let mut kept = coordinates.to_vec();
+        let fastest = kept[TIME_CONSTANT].0.lowest;
+        for ((coordinate, value), fixed) in kept.iter_mut().zip([0.0, fastest]) {
+            (coordinate.fitted, *value) = (false, fixed);
+        }
         without.push(kept);
     }
     without
@@ -127,11 +140,17 @@ mod tests {
         assert!(without_each(&relaxation, &[]).is_empty());
         let without = without_each(&relaxation, &all);
         let fixed = |of: &[(Coordinate, f64)]| -> Vec<usize> { (0..8).filter(|&at| !of[at].0.fitted).collect() };
-        assert_eq!(without.iter().map(|of| fixed(of)).collect::<Vec<_>>(), [vec![2, 3], vec![4, 5, 6, 7]]);
+        let each = [vec![2, 3], vec![4, 5, 6, 7], vec![0, 1]];
+        assert_eq!(without.iter().map(|of| fixed(of)).collect::<Vec<_>>(), each);
         let of = |kept: &[(Coordinate, f64)]| moved(&relaxation, kept.iter().map(|(_, value)| *value));
         assert_eq!((of(&without[0]).parts().count(), of(&without[0]).oscillations().count()), (0, 1));
         assert_eq!((of(&without[1]).parts().count(), of(&without[1]).oscillations().count()), (1, 0));
-        let neither = without_each(&relaxation, &without[0]);
+        let feedthrough = of(&without[2]);
+        assert_eq!((feedthrough.share, feedthrough.tau_s), (0.0, all[1].0.lowest.exp()));
+        let more = |of: &[(Coordinate, f64)]| without_each(&relaxation, of);
+        let fewer: Vec<_> = more(&without[0]).iter().map(|of| fixed(of)).collect();
+        assert_eq!(fewer, [vec![2, 3, 4, 5, 6, 7], vec![0, 1, 2, 3]]);
+        let neither = more(&without[1]);
         assert_eq!(neither.iter().map(|of| fixed(of)).collect::<Vec<_>>(), [vec![2, 3, 4, 5, 6, 7]]);
         assert!(without_each(&relaxation, &neither[0]).is_empty());
     }

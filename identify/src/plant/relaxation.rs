@@ -287,6 +287,13 @@ impl Running {
         }
     }
 
+    /// Returns the stiffness without its feedthrough, in V.
+    pub fn relaxed(&self) -> f64 {
+        let lags = self.lags.iter().map(|(part, lag)| part * lag.value());
+        let oscillations = self.oscillations.iter().map(|(mode, oscillator)| output(mode, oscillator));
+        self.first_weight * self.lag.value() + lags.chain(oscillations).sum::<f64>()
+    }
+
     /// Advances over one piece of the settled stiffness and returns the stiffness at its start and end, both in V. `level_v` is the
     /// voltage that sets the time constant, in V, if it depends on that.
     pub fn pass(&mut self, piece: Piece, level_v: Option<f64>) -> (f64, f64) {
