@@ -61,7 +61,8 @@ fn absorbed(data: &Data, errors: &[f64], memory: &Autocorrelation) -> Option<Unm
         let new = root_mean_square(&memory.whitened(errors)) / root_mean_square(errors);
         return Some(found("as a rhythm that changes along the record", (1.0 - new * new).max(0.0)));
     }
-    let line = spectrum::most_prominent_line(errors, data).filter(|line| line.prominence > LINE_TO_NEIGHBOURS.get())?;
+    let line = spectrum::most_prominent_line(errors, data, spectrum::OF_A_SINE)
+        .filter(|line| line.prominence > LINE_TO_NEIGHBOURS.get())?;
     let frequency = data.scales().shown(Dimension::Frequency, line.frequency_hz, 3);
     Some(found(&format!("at a frequency of {frequency}"), line.share))
 }

@@ -12,12 +12,12 @@
 use std::f64::consts::TAU;
 
 use crate::dimension::Dimension;
+use crate::effects::boundary;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
 use crate::record::data::Data;
 use crate::record::spectrum;
 use crate::stats::shifted_run::autocorrelation;
 use crate::stats::thresholds::empirical::{CLIP_FOR_RUN, FEWEST_PERIODS, LEAST_PART_OF_STEP, SHORTEST_RUN};
-use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
 pub(super) struct Drift;
 
@@ -195,7 +195,6 @@ impl Effect for Drift {
         }
     }
 
-    /// The row may move as long as that costs less than [`NATS_WITHIN_INTERVAL`] (95 %).
     fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
         if form != STEP {
             return Vec::new();
@@ -205,16 +204,8 @@ impl Effect for Drift {
         let change = |row: usize| point[1] * data.reading[row] / (1.0 + point[1]);
         // Cost of leaving a row without the factor, in nats; giving it to one costs the negative.
         let cost = |row: usize| (residual[row] * change(row) - 0.5 * change(row).powi(2)) / (sigma * sigma);
-        let reach = |outwards: &mut dyn Iterator<Item = usize>, sign: f64| {
-            let costs = outwards.scan(0.0, |sum, row| {
-                *sum += sign * cost(row);
-                Some((row, *sum))
-            });
-            costs.take(data.rows() / 10).filter(|(_, sum)| *sum < NATS_WITHIN_INTERVAL).last().map(|(row, _)| row)
-        };
-        let earliest = reach(&mut (0..row).rev(), -1.0).unwrap_or(row).saturating_sub(1);
-        let latest = reach(&mut (row..data.rows()), 1.0).map_or(row, |row| row + 1);
-        vec![("at_s".into(), data.time_s[earliest], data.time_s[latest.min(data.rows() - 1)])]
+        let at = boundary::range(row, data.rows(), |row| -cost(row), cost);
+        vec![("at_s".into(), data.time_s[*at.start()], data.time_s[*at.end()])]
     }
 
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {

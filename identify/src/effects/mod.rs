@@ -8,6 +8,7 @@
 
 mod amplifier_limit;
 mod amplifier_slew;
+mod boundary;
 mod catalogue;
 mod charge_leakage;
 mod delay;
@@ -15,6 +16,7 @@ mod drift;
 pub mod effect;
 mod gain_error;
 mod hum;
+mod hum_envelope;
 mod hysteresis;
 pub mod identified;
 mod instantaneous_share;

@@ -21,8 +21,10 @@ pub struct Peak {
 /// Number of rows after which the recursive oscillation is computed afresh.
 const ROTATIONS: usize = 64;
 
-/// Number of line widths on each side that count as neighbours of a line.
-const NEIGHBOURS: usize = 16;
+/// Number of line widths on each side of a sine that are its own.
+pub const OF_A_SINE: usize = 2;
+/// Number of line widths on each side, beyond those that are a line's own, that count as its neighbours.
+const NEIGHBOURS: usize = 14;
 
 /// Returns the power of each frequency bin, and the width of a line in bins.
 fn powers(residual: &[f64], data: &Data) -> (Vec<f64>, usize) {
@@ -44,8 +46,9 @@ pub struct Line {
     pub share: f64,
 }
 
-/// Returns the most prominent line with at least [`FEWEST_PERIODS`] periods in the record; `None` for short records.
-pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
+/// Returns the most prominent line with at least [`FEWEST_PERIODS`] periods in the record, of which `own` line widths on each side are its
+/// own; `None` for short records.
+pub fn most_prominent_line(residual: &[f64], data: &Data, own: usize) -> Option<Line> {
     if residual.len() < FEWEST_ROWS_FOR_LINES.count() {
         return None;
     }
@@ -58,7 +61,7 @@ pub fn most_prominent_line(residual: &[f64], data: &Data) -> Option<Line> {
     let sum = |from: usize, to: usize| (before[to] - before[from], (to - from) as f64);
     let prominence = |bin: usize| {
         let reach = |widths: usize| (bin.saturating_sub(widths * width), (bin + widths * width).min(power.len()));
-        let ((from, to), (own_from, own_to)) = (reach(NEIGHBOURS), reach(2));
+        let ((from, to), (own_from, own_to)) = (reach(own + NEIGHBOURS), reach(own));
         let (left, right) = (sum(from, own_from), sum(own_to, to));
         power[bin] * (left.1 + right.1) / (left.0 + right.0).max(f64::MIN_POSITIVE)
     };
