@@ -4,9 +4,10 @@
 //! | --- | --- |
 //! | both ways | `-slew <= du/dt <= slew` |
 //! | two rates | `-falling <= du/dt <= slew` |
+//! | power | `-2 slew <= d(u |u| / full scale)/dt <= 2 slew`: a charger of constant power, slower at a high voltage |
 //!
-//! The exponential approach of an output resistance is a `series-lag`. If the record may not begin at rest, the voltage of a rate-limited amplifier before the first row is a further
-//! coordinate.
+//! The exponential approach of an output resistance is a `series-lag`. If the record may not begin at rest, the voltage of a
+//! rate-limited amplifier before the first row is a further coordinate.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
@@ -17,8 +18,9 @@ pub(super) struct AmplifierSlew;
 
 const BOTH_WAYS: usize = 0;
 const TWO_RATES: usize = 1;
+const POWER: usize = 2;
 /// Number of rates of a form.
-const RATES: [usize; 2] = [1, 2];
+const RATES: [usize; 3] = [1, 2, 1];
 /// Ratio of the two rates at initial points.
 const INITIAL_RATIO: f64 = 3.0;
 /// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
@@ -51,6 +53,10 @@ impl Effect for AmplifierSlew {
     }
 
     fn forms(&self) -> usize {
+        3
+    }
+
+    fn common_forms(&self) -> usize {
         2
     }
 
@@ -65,7 +71,7 @@ impl Effect for AmplifierSlew {
         let (slowest, fastest) = range(data);
         let rates = (2.0 * slowest, 0.8 * fastest);
         let starts: Vec<Vec<f64>> = match form {
-            BOTH_WAYS => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
+            BOTH_WAYS | POWER => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
             _ => logarithms(rates, 10)
                 .flat_map(|rate| [INITIAL_RATIO.ln(), -INITIAL_RATIO.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
@@ -75,6 +81,7 @@ impl Effect for AmplifierSlew {
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
     }
 
+    /// The rate of a charger is that at the largest voltage.
     fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
         let value = point[0].exp();
         match form {
@@ -90,8 +97,13 @@ impl Effect for AmplifierSlew {
         (form != BOTH_WAYS).then(|| table(self, form, point, data))
     }
 
-    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
+        if form == POWER {
+            chain.initial_v = point.get(RATES[form]).copied();
+            chain.power_v2_per_s = chain.power_v2_per_s.min(2.0 * stroke(data) * value);
+            return;
+        }
         let falling = point[RATES[form] - 1].exp();
         chain.initial_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);

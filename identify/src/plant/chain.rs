@@ -33,6 +33,8 @@ pub struct Chain<'a> {
     pub rising_v_per_s: f64,
     /// Largest rate at which it falls, in V/s, positive.
     pub falling_v_per_s: f64,
+    /// Largest rate of its square, with its sign, in V^2/s: the power of its charger.
+    pub power_v2_per_s: f64,
     /// Amplifier voltage before the first row, in V; `None` if it equals the command.
     pub initial_v: Option<f64>,
     /// Time constant of the amplifier's output resistance with the spring's capacitance, in s; 0 for none.
@@ -81,6 +83,7 @@ impl<'a> Chain<'a> {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
+            power_v2_per_s: f64::INFINITY,
             initial_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
@@ -185,9 +188,12 @@ impl<'a> Chain<'a> {
         if self.limit_v.is_finite() {
             signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
         }
+        signal.before = self.initial_v.unwrap_or(signal.before);
         if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
-            signal.before = self.initial_v.unwrap_or(signal.before);
             *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
+        }
+        if self.power_v2_per_s.is_finite() {
+            *signal = signal.charged(self.power_v2_per_s);
         }
         if self.output_tau_s > 0.0 {
             let mut output = Lag::at(self.output_tau_s, signal.before);

@@ -17,6 +17,9 @@ pub struct Piece {
     pub to: f64,
 }
 
+/// Number of straight pieces that follow a root over one piece of its square.
+const PARTS_OF_ROOT: usize = 4;
+
 /// A signal over time: contiguous straight pieces, which may jump at their borders.
 #[derive(Debug, Default)]
 pub struct Signal {
@@ -229,6 +232,36 @@ impl Signal {
         slewed
     }
 
+    /// Returns the output of a charger of bounded power that follows the signal: the output's square, with its sign, changes by at most
+    /// `rate` per s.
+    pub fn charged(&self, rate: f64) -> Self {
+        let mut square = self.clone();
+        square.map(|value| value * value.abs());
+        let square = square.slewed(rate, rate);
+        let root = |square: f64| square.abs().sqrt().copysign(square);
+        let mut charged = square.emptied();
+        charged.before = self.before;
+        let mut rows = square.rows.iter().peekable();
+        for (index, &Piece { duration_s, from, to }) in square.pieces.iter().enumerate() {
+            if rows.next_if(|&&row| row as usize == index).is_some() {
+                charged.start_row();
+            }
+            let [start, end] = [from, to].map(root);
+            let is_bound = (to - from).abs() > 0.999 * rate * duration_s;
+            let parts = if is_bound && to != from { PARTS_OF_ROOT } else { 1 };
+            let (mut last, mut passed_s) = (start, 0.0);
+            for part in 1..=parts {
+                // Straight between equally spaced outputs, which the square passes at known times.
+                let output = start + (end - start) * part as f64 / parts as f64;
+                let at_s =
+                    if part == parts { duration_s } else { (output * output.abs() - from) / (to - from) * duration_s };
+                charged.pieces.push(Piece { duration_s: at_s - passed_s, from: last, to: output });
+                (last, passed_s) = (output, at_s);
+            }
+        }
+        charged
+    }
+
     /// Returns the magnitude of the signal; a piece that crosses zero becomes two.
     pub fn magnitude(&self) -> Self {
         let mut magnitude = self.emptied();
@@ -282,6 +315,21 @@ mod tests {
         let text = "time_s,voltage_v\n0,0\n1,100\n2,100\n3,100\n4,0\n";
         let record = Record::parse("r", text, "stiffness").unwrap();
         Signal::new(&Schedule::from_record(&record, Between::Hold), &[0.0, 1.0, 2.0, 3.0, 4.0], 0.0)
+    }
+
+    /// From 0 V the first tenth of the power's time takes a third of the voltage.
+    #[test]
+    fn charged_signal_follows_the_root_of_the_energy() {
+        // 100 V hold 10 000 V^2.
+        let got = rows(&step().charged(2500.0));
+        let expected = [0.0, 0.0, 50.0, 5000f64.sqrt(), 7500f64.sqrt()];
+        assert!(got.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-9), "{got:?}");
+        assert_eq!(rows(&step().charged(1e9)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+        let finer = step().charged(2500.0);
+        let area: f64 = finer.pieces().iter().map(|piece| piece.duration_s * 0.5 * (piece.from + piece.to)).sum();
+        // The integral of 100 V sqrt(t / 4 s) over 3 s, and the piece of the last row.
+        let exact = 200.0 / 3.0 * 3f64.sqrt() * 1.5;
+        assert!((area / exact - 1.0).abs() < 0.01, "{area} instead of {exact}");
     }
 
     #[test]

@@ -1,0 +1,114 @@
+//! Records of a spring whose cause has a form that is seldom needed are explained by that cause alone.
+
+use std::f64::consts::TAU;
+
+use identify::answer::Parameter;
+use identify::{Options, Report, Verdict, examine};
+use simulation::record::{Record, Row};
+
+const ROWS: usize = 2000;
+const SAMPLE_S: f64 = 0.1;
+/// Integration steps from row to row.
+const STEPS: usize = 100;
+/// Height of the first step, the largest.
+const FULL_SCALE_V: f64 = 500.0;
+const FREQ_HZ: f64 = 0.73;
+
+/// Diagnoses the paper's spring under steps of 6 s, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
+/// and the one 1 ms ago, `added_v` what is added to the reading in a row at a response; all in V.
+fn diagnosed(amplified_v: impl Fn(f64, f64) -> f64, added_v: impl Fn(usize, f64) -> f64) -> Report {
+    let mut seed = 11u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1 << 24)
+    };
+    // Proportional gain 0.1, integral gain 0.2 per s.
+    let (share, tau_s) = (0.1 / 1.1, 5.5);
+    let (mut voltage_v, mut across_v, mut lag) = (0.0, 0.0, 0.0);
+    let row = |row: usize| {
+        let before_v = across_v;
+        if row % 60 == 20 {
+            voltage_v = if row == 20 { FULL_SCALE_V } else { (FULL_SCALE_V * random()).round() };
+        }
+        let jumped_v = amplified_v(voltage_v, before_v);
+        // Without a bound the first reading after a step has its feedthrough.
+        let response = share * if jumped_v == voltage_v { voltage_v } else { before_v } + (1.0 - share) * lag;
+        for _ in 0..STEPS {
+            across_v = amplified_v(voltage_v, across_v);
+            lag += (across_v - lag) * SAMPLE_S / STEPS as f64 / tau_s;
+        }
+        let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let measured = Some(response + added_v(row, response) + noise);
+        Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured }
+    };
+    let record = Record { name: "hum".into(), rows: (0..ROWS).map(row).collect() };
+    examine(&record, &Options::default(), |_| ()).unwrap().report
+}
+
+/// Diagnoses an ideal amplifier's spring with a sine of an amplitude that depends on row and response.
+fn with_hum(amplitude_v: impl Fn(usize, f64) -> f64) -> Report {
+    let sine = |row: usize| (TAU * FREQ_HZ * SAMPLE_S * row as f64).sin();
+    diagnosed(|voltage_v, _| voltage_v, |row, response| amplitude_v(row, response) * sine(row))
+}
+
+/// Checks that a cause is all that is found, and that what is left is the noise. Returns a parameter of its.
+fn of_only_finding<'r>(report: &'r Report, cause: &str, name: &str) -> &'r Parameter {
+    assert_eq!((report.verdict, report.findings.len()), (Verdict::Explained, 1), "{report:#?}");
+    let finding = &report.findings[0];
+    assert_eq!(finding.cause, cause);
+    assert!(report.extended.quality.rmse < 1.1, "{:?}", report.extended.quality);
+    finding.parameters.iter().find(|(of, _)| of == name).map(|(_, parameter)| parameter).unwrap()
+}
+
+/// Checks that the hum is all that is found, and returns its amplitude, in V.
+fn amplitude_v(report: &Report) -> f64 {
+    let freq = of_only_finding(report, "hum", "freq_hz");
+    assert!(freq.low < FREQ_HZ && FREQ_HZ < freq.high && freq.high - freq.low < 0.0051, "{freq:?}");
+    let amplitude = of_only_finding(report, "hum", "amplitude");
+    assert!(amplitude.high - amplitude.low < 0.1 * amplitude.value, "{amplitude:?}");
+    amplitude.value
+}
+
+#[test]
+fn a_hum_that_is_switched_on_and_off_has_a_beginning_and_an_end() {
+    let report = with_hum(|row, _| if (520..1310).contains(&row) { 6.0 } else { 0.0 });
+    let amplitude = amplitude_v(&report);
+    assert!((amplitude - 6.0).abs() < 0.2, "{amplitude} V");
+    for (name, row) in [("from_s", 520.0), ("to_s", 1309.0)] {
+        let parameter = of_only_finding(&report, "hum", name);
+        let at_s = SAMPLE_S * row;
+        assert!(parameter.low <= at_s && at_s <= parameter.high, "{name}: {parameter:?}");
+        assert!(parameter.high - parameter.low < 2.0, "{name}: {parameter:?}");
+    }
+}
+
+#[test]
+fn a_hum_whose_amplitude_changes_slowly_has_its_mean_amplitude() {
+    let amplitude_of = |row: usize| 6.0 - 4.0 * (TAU * row as f64 / ROWS as f64).cos();
+    let amplitude = amplitude_v(&with_hum(|row, _| amplitude_of(row)));
+    // Mean square: 6^2 + 4^2 / 2.
+    assert!((amplitude - 44f64.sqrt()).abs() < 0.2, "{amplitude} V");
+}
+
+/// Largest halfway to full scale, as the ripple of a converter with pulses.
+#[test]
+fn a_hum_whose_amplitude_is_a_parabola_of_the_response_is_found() {
+    let of_response = |response: f64| 32.0 * (response / 500.0) * (1.0 - response / 500.0);
+    let amplitude = amplitude_v(&with_hum(|_, response| of_response(response)));
+    assert!((3.0..8.0).contains(&amplitude), "{amplitude} V");
+}
+
+/// The charger takes 2 s from 0 V to full scale.
+#[test]
+fn an_amplifier_of_constant_power_has_a_bounded_rate() {
+    const POWER_V2_PER_S: f64 = FULL_SCALE_V * FULL_SCALE_V / 2.0;
+    let charged = |voltage_v: f64, before_v: f64| {
+        let most = POWER_V2_PER_S * SAMPLE_S / STEPS as f64;
+        let square = before_v * before_v;
+        (square + (voltage_v * voltage_v - square).clamp(-most, most)).sqrt()
+    };
+    let report = diagnosed(charged, |_, _| 0.0);
+    let slew = of_only_finding(&report, "amplifier-slew", "slew_v_per_s");
+    let exact = POWER_V2_PER_S / (2.0 * FULL_SCALE_V);
+    assert!(slew.low < exact && exact < slew.high && slew.high - slew.low < 0.05 * exact, "{exact}: {slew:?}");
+}
