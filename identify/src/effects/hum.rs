@@ -37,7 +37,7 @@ const HARMONICS: usize = 3;
 /// Frequencies that are tried on each side of a line, and their distance, in periods per record.
 const LINE_STEPS: i32 = 5;
 const LINE_STEP: f64 = 0.1;
-/// The same for an amplitude that changes, in periods per record.
+/// Frequencies that are tried on each side of the line of an amplitude that changes, one period per record from each other.
 const SIDE_LINES: i32 = KNOTS as i32 / 2;
 /// Fewest periods from one knot of a varying amplitude to the next: with fewer it would follow what is not periodic.
 const PERIODS_PER_KNOT: f64 = 2.0;
@@ -168,15 +168,15 @@ impl Effect for Hum {
         };
         let peaks =
             if form == SINE { spectrum::peaks(residual, data, PEAKS) } else { stands_out().into_iter().collect() };
-        let start = |peak: Peak| {
+        let constant = |peak: Peak| {
             let further = (2..=sines(form)).map(|k| spectrum::line(residual, data, k as f64 * peak.frequency_hz));
             let each = std::iter::once(peak).chain(further).flat_map(|it| [scale * it.cosine, scale * it.sine]);
-            Some(std::iter::once(peak.frequency_hz).chain(each).collect())
+            std::iter::once(peak.frequency_hz).chain(each).collect()
         };
         let start = |peak: Peak| match form {
             VARYING | BY_RESPONSE => with_envelope(form, peak.frequency_hz, residual, data),
             STRETCH => in_stretch(peak.frequency_hz, residual, data),
-            _ => start(peak),
+            _ => Some(constant(peak)),
         };
         let voltage = centred(&data.voltage_v);
         let fewest = if form == VARYING { PERIODS_PER_KNOT * KNOTS as f64 } else { 0.0 };

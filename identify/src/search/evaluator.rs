@@ -1,5 +1,7 @@
 //! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
 
+use std::collections::HashSet;
+
 use crate::adequacy;
 use crate::effects::EFFECTS;
 use crate::effects::effect::FitContext;
@@ -210,7 +212,7 @@ impl Evaluator for Engine<'_> {
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.
 const STARTS_IF_SCARCE: usize = 16;
-/// Forms of [`Forms::Rare`] that are fitted, those with the largest predicted gains.
+/// Number of forms of [`Forms::Rare`] that are fitted.
 const RARE_FORMS_FITTED: usize = 4;
 /// Smallest predicted gain of what is fitted beside one of these, relative to its own.
 const PART_OF_BEST: f64 = 0.1;
@@ -260,13 +262,19 @@ fn extensions(
     found
 }
 
-/// The rare forms that are worth fitting, those with the largest predicted gains first.
+/// The rare forms that are worth fitting, those with the largest predicted gains first: the best of each effect, then others as long as
+/// there is room.
 fn rare(mut found: Vec<Extension>) -> Vec<Extension> {
-    found.sort_by(|a, b| b.predicted_gain.total_cmp(&a.predicted_gain));
-    found.truncate(RARE_FORMS_FITTED);
-    let best = found.first().map_or(0.0, |it| it.predicted_gain);
-    found.retain(|it| it.predicted_gain > PART_OF_BEST * best);
-    found
+    let by_gain = |a: &Extension, b: &Extension| b.predicted_gain.total_cmp(&a.predicted_gain);
+    found.sort_by(by_gain);
+    let mut seen = HashSet::new();
+    let (mut kept, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|it| seen.insert(it.block.effect));
+    kept.extend(others);
+    kept.truncate(RARE_FORMS_FITTED);
+    kept.sort_by(by_gain);
+    let best = kept.first().map_or(0.0, |it| it.predicted_gain);
+    kept.retain(|it| it.predicted_gain > PART_OF_BEST * best);
+    kept
 }
 
 /// True if a form would gain many times its price.
@@ -354,5 +362,25 @@ impl<'f> Screening<'f> {
         let change: Vec<f64> = self.from_rest.iter().zip(&there).map(|(a, b)| a - b).collect();
         engine.budget().spend(PREDICTION * change.len() as u64);
         self.predictors.iter().map(|predictor| predictor.predicted_gain(&change)).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Five forms of one effect promise more than one of another.
+    #[test]
+    fn rare_forms_of_one_effect_leave_room_for_another() {
+        let of = |effect, form, predicted_gain| Extension {
+            block: Block { effect, form },
+            point: Vec::new(),
+            predicted_gain,
+        };
+        let mut found: Vec<Extension> = (1..=5).map(|form| of(3, form, 100.0 + form as f64)).collect();
+        found.extend([of(7, 2, 60.0), of(8, 1, 5.0)]);
+        let kept: Vec<(usize, usize)> = rare(found).iter().map(|it| (it.block.effect, it.block.form)).collect();
+        // That of the third effect promises less than a tenth.
+        assert_eq!(kept, [(3, 5), (3, 4), (7, 2)]);
     }
 }
