@@ -41,7 +41,7 @@ fn diagnosed(amplified_v: impl Fn(f64, f64) -> f64, added_v: impl Fn(usize, f64)
         let measured = Some(response + added_v(row, response) + noise);
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured }
     };
-    let record = Record { name: "hum".into(), rows: (0..ROWS).map(row).collect() };
+    let record = Record { name: "steps".into(), rows: (0..ROWS).map(row).collect() };
     examine(&record, &Options::default(), |_| ()).unwrap().report
 }
 
@@ -51,7 +51,7 @@ fn with_hum(amplitude_v: impl Fn(usize, f64) -> f64) -> Report {
     diagnosed(|voltage_v, _| voltage_v, |row, response| amplitude_v(row, response) * sine(row))
 }
 
-/// Checks that a cause is all that is found, and that what is left is the noise. Returns a parameter of its.
+/// Checks that a cause is all that is found, and that what is left is the noise. Returns one of its parameters.
 fn of_only_finding<'r>(report: &'r Report, cause: &str, name: &str) -> &'r Parameter {
     assert_eq!((report.verdict, report.findings.len()), (Verdict::Explained, 1), "{report:#?}");
     let finding = &report.findings[0];

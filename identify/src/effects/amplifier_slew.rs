@@ -99,13 +99,12 @@ impl Effect for AmplifierSlew {
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
+        chain.initial_v = point.get(RATES[form]).copied();
         if form == POWER {
-            chain.initial_v = point.get(RATES[form]).copied();
             chain.power_v2_per_s = chain.power_v2_per_s.min(2.0 * stroke(data) * value);
             return;
         }
         let falling = point[RATES[form] - 1].exp();
-        chain.initial_v = point.get(RATES[form]).copied();
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }

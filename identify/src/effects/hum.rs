@@ -87,11 +87,10 @@ fn pairs(form: usize) -> usize {
 /// do not determine it. A disturbance whose amplitude changes sign has its lines beside its frequency.
 fn with_envelope(form: usize, frequency_hz: f64, residual: &[f64], data: &Data) -> Option<Vec<f64>> {
     let near = (-SIDE_LINES..=SIDE_LINES).map(|line| frequency_hz + f64::from(line) / data.duration_s());
-    let responses = || data.reading.iter().map(|reading| over_response(reading / data.full_scale_v));
     let fits = near.filter(|frequency_hz| *frequency_hz > 0.0).filter_map(|frequency_hz| {
         let (gain, amplitudes) = match form {
             VARYING => hum_envelope::fitted(residual, data, frequency_hz, KNOTS, over_time(data)),
-            _ => hum_envelope::fitted(residual, data, frequency_hz, POWERS, responses()),
+            _ => hum_envelope::fitted(residual, data, frequency_hz, POWERS, over_response(data)),
         }?;
         Some((gain, std::iter::once(frequency_hz).chain(amplitudes).collect()))
     });
@@ -195,10 +194,7 @@ impl Effect for Hum {
         let amplitude = match form {
             IN_PROPORTION => data.full_scale_v * sum(&point[1..]),
             VARYING => hum_envelope::mean(&point[1..], over_time(data)),
-            BY_RESPONSE => {
-                let responses = data.reading.iter().map(|reading| over_response(reading / data.full_scale_v));
-                hum_envelope::mean(&point[1..], responses)
-            }
+            BY_RESPONSE => hum_envelope::mean(&point[1..], over_response(data)),
             STRETCH => sum(&point[1..3]),
             _ => sum(&point[1..]),
         };
@@ -256,37 +252,40 @@ impl Effect for Hum {
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
+        let amplitudes = &point[1..];
+        let add = |reading: &mut f64, [cosine, sine]: [f64; 2], (sin, cos): (f64, f64)| {
+            *reading += cosine * cos + sine * sin;
+        };
         let oscillation = spectrum::oscillation(point[0], data);
-        if form == VARYING {
-            for ((reading, (sin, cos)), weights) in readings.iter_mut().zip(oscillation).zip(over_time(data)) {
-                let [cosine, sine] = hum_envelope::at(&point[1..], weights);
-                *reading += cosine * cos + sine * sin;
+        match form {
+            VARYING => {
+                for ((reading, turn), weights) in readings.iter_mut().zip(oscillation).zip(over_time(data)) {
+                    add(reading, hum_envelope::at(amplitudes, weights), turn);
+                }
             }
-            return;
-        }
-        if form == BY_RESPONSE {
-            for (reading, (sin, cos)) in readings.iter_mut().zip(oscillation) {
-                let [cosine, sine] = hum_envelope::at(&point[1..], over_response(*reading / data.full_scale_v));
-                *reading += cosine * cos + sine * sin;
+            BY_RESPONSE => {
+                for (reading, turn) in readings.iter_mut().zip(oscillation) {
+                    let weights = hum_envelope::at_response(*reading, data);
+                    add(reading, hum_envelope::at(amplitudes, weights), turn);
+                }
             }
-            return;
-        }
-        if form == STRETCH {
-            let rows = rows_of(point, readings.len());
-            let oscillation = oscillation.skip(rows.start);
-            for (reading, (sin, cos)) in readings[rows].iter_mut().zip(oscillation) {
-                *reading += point[1] * cos + point[2] * sin;
+            STRETCH => {
+                let rows = rows_of(point, readings.len());
+                for (reading, turn) in readings[rows.clone()].iter_mut().zip(oscillation.skip(rows.start)) {
+                    add(reading, [amplitudes[0], amplitudes[1]], turn);
+                }
             }
-            return;
-        }
-        for (reading, (sin, cos)) in readings.iter_mut().zip(oscillation) {
-            let mut turned = (1.0, 0.0);
-            let mut sum = 0.0;
-            for amplitudes in point[1..].chunks_exact(2) {
-                turned = (turned.0 * cos - turned.1 * sin, turned.1 * cos + turned.0 * sin);
-                sum += amplitudes[0] * turned.0 + amplitudes[1] * turned.1;
+            _ => {
+                for (reading, (sin, cos)) in readings.iter_mut().zip(oscillation) {
+                    let mut turned = (1.0, 0.0);
+                    let mut sum = 0.0;
+                    for amplitudes in amplitudes.chunks_exact(2) {
+                        turned = (turned.0 * cos - turned.1 * sin, turned.1 * cos + turned.0 * sin);
+                        sum += amplitudes[0] * turned.0 + amplitudes[1] * turned.1;
+                    }
+                    *reading += if form == IN_PROPORTION { *reading * sum } else { sum };
+                }
             }
-            *reading += if form == IN_PROPORTION { *reading * sum } else { sum };
         }
     }
 }

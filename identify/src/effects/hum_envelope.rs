@@ -39,9 +39,15 @@ pub(super) fn over_time(data: &Data) -> impl Iterator<Item = Weights<2>> {
     })
 }
 
-/// Returns the weights of constant, straight and square amplitude at a response relative to the full scale.
-pub(super) fn over_response(relative: f64) -> Weights<POWERS> {
+/// Returns the weights of constant, straight and square amplitude at a response, in V, relative to the full scale.
+pub(super) fn at_response(response_v: f64, data: &Data) -> Weights<POWERS> {
+    let relative = response_v / data.full_scale_v;
     (0, [1.0, relative, relative * relative])
+}
+
+/// Returns these weights at the reading of each row.
+pub(super) fn over_response(data: &Data) -> impl Iterator<Item = Weights<POWERS>> {
+    data.reading.iter().map(|reading| at_response(*reading, data))
 }
 
 /// Returns cosine and sine amplitude of a row, in V, from those of all weights in turn.

@@ -163,7 +163,6 @@ impl Signal {
 
     /// Returns the signal delayed by `delay_s`, in s; rows keep their times.
     pub fn delayed(&self, delay_s: f64) -> Self {
-        let mut later = self.emptied();
         let constant = Piece { duration_s: delay_s, from: self.before, to: self.before };
         let all = std::iter::once(constant).chain(self.pieces.iter().copied()).filter(|p| p.duration_s > ROUNDING_S);
         let mut source = all.peekable();
@@ -177,11 +176,7 @@ impl Signal {
             Some(piece)
         };
         let mut rest = next().unwrap_or(constant);
-        let mut rows = self.rows.iter().peekable();
-        for (index, piece) in self.pieces.iter().enumerate() {
-            if rows.next_if(|&&row| row as usize == index).is_some() {
-                later.start_row();
-            }
+        self.rebuilt(|piece, pieces| {
             let mut left = piece.duration_s;
             loop {
                 if rest.duration_s <= ROUNDING_S {
@@ -191,26 +186,20 @@ impl Signal {
                 let taken = left.min(rest.duration_s);
                 let slope = if rest.from == rest.to { 0.0 } else { (rest.to - rest.from) / rest.duration_s };
                 let until = rest.from + slope * taken;
-                later.pieces.push(Piece { duration_s: taken, from: rest.from, to: until });
+                pieces.push(Piece { duration_s: taken, from: rest.from, to: until });
                 rest = Piece { duration_s: rest.duration_s - taken, from: until, ..rest };
                 left -= taken;
                 if left <= ROUNDING_S {
                     break;
                 }
             }
-        }
-        later
+        })
     }
 
     /// Returns a signal that follows this one at rates of at most `rising` and `falling`, in V/s, both positive.
     pub fn slewed(&self, rising: f64, falling: f64) -> Self {
-        let mut slewed = self.emptied();
         let mut now = self.before;
-        let mut rows = self.rows.iter().peekable();
-        for (index, &Piece { duration_s, from, to }) in self.pieces.iter().enumerate() {
-            if rows.next_if(|&&row| row as usize == index).is_some() {
-                slewed.start_row();
-            }
+        self.rebuilt(|Piece { duration_s, from, to }, pieces| {
             let slope = if duration_s > 0.0 { (to - from) / duration_s } else { 0.0 };
             let mut left = duration_s;
             if from != now || slope > rising || -slope > falling {
@@ -220,16 +209,15 @@ impl Signal {
                 let closing = rate - slope;
                 let meets = if closing * ahead > 0.0 { (from - now) / closing } else { f64::INFINITY };
                 let taken = meets.clamp(0.0, left);
-                slewed.pieces.push(Piece { duration_s: taken, from: now, to: now + rate * taken });
+                pieces.push(Piece { duration_s: taken, from: now, to: now + rate * taken });
                 now += rate * taken;
                 left -= taken;
             }
             if left > ROUNDING_S || duration_s == 0.0 && from == now {
-                slewed.pieces.push(Piece { duration_s: left, from: now, to: now + slope * left });
+                pieces.push(Piece { duration_s: left, from: now, to: now + slope * left });
                 now += slope * left;
             }
-        }
-        slewed
+        })
     }
 
     /// Returns the output of a charger of bounded power that follows the signal: the output's square, with its sign, changes by at most
@@ -239,13 +227,7 @@ impl Signal {
         square.map(|value| value * value.abs());
         let square = square.slewed(rate, rate);
         let root = |square: f64| square.abs().sqrt().copysign(square);
-        let mut charged = square.emptied();
-        charged.before = self.before;
-        let mut rows = square.rows.iter().peekable();
-        for (index, &Piece { duration_s, from, to }) in square.pieces.iter().enumerate() {
-            if rows.next_if(|&&row| row as usize == index).is_some() {
-                charged.start_row();
-            }
+        let mut charged = square.rebuilt(|Piece { duration_s, from, to }, pieces| {
             let [start, end] = [from, to].map(root);
             let is_bound = (to - from).abs() > 0.999 * rate * duration_s;
             let parts = if is_bound && to != from { PARTS_OF_ROOT } else { 1 };
@@ -255,30 +237,26 @@ impl Signal {
                 let output = start + (end - start) * part as f64 / parts as f64;
                 let at_s =
                     if part == parts { duration_s } else { (output * output.abs() - from) / (to - from) * duration_s };
-                charged.pieces.push(Piece { duration_s: at_s - passed_s, from: last, to: output });
+                pieces.push(Piece { duration_s: at_s - passed_s, from: last, to: output });
                 (last, passed_s) = (output, at_s);
             }
-        }
+        });
+        charged.before = self.before;
         charged
     }
 
     /// Returns the magnitude of the signal; a piece that crosses zero becomes two.
     pub fn magnitude(&self) -> Self {
-        let mut magnitude = self.emptied();
-        magnitude.before = self.before.abs();
-        let mut rows = self.rows.iter().peekable();
-        for (index, &Piece { duration_s, from, to }) in self.pieces.iter().enumerate() {
-            if rows.next_if(|&&row| row as usize == index).is_some() {
-                magnitude.start_row();
-            }
+        let mut magnitude = self.rebuilt(|Piece { duration_s, from, to }, pieces| {
             let crossing_s = duration_s * from / (from - to);
             if from * to < 0.0 && crossing_s > 0.0 && crossing_s < duration_s {
-                magnitude.pieces.push(Piece { duration_s: crossing_s, from: from.abs(), to: 0.0 });
-                magnitude.pieces.push(Piece { duration_s: duration_s - crossing_s, from: 0.0, to: to.abs() });
+                pieces.push(Piece { duration_s: crossing_s, from: from.abs(), to: 0.0 });
+                pieces.push(Piece { duration_s: duration_s - crossing_s, from: 0.0, to: to.abs() });
             } else {
-                magnitude.pieces.push(Piece { duration_s, from: from.abs(), to: to.abs() });
+                pieces.push(Piece { duration_s, from: from.abs(), to: to.abs() });
             }
-        }
+        });
+        magnitude.before = self.before.abs();
         magnitude
     }
 
@@ -290,6 +268,19 @@ impl Signal {
             *piece = Piece { duration_s: duration * piece.duration_s, from: value * piece.from, to: value * piece.to };
         }
         scaled
+    }
+
+    /// Returns the signal with other pieces in place of each, which `put` appends; rows keep their times.
+    fn rebuilt(&self, mut put: impl FnMut(Piece, &mut Vec<Piece>)) -> Self {
+        let mut rebuilt = self.emptied();
+        let mut rows = self.rows.iter().peekable();
+        for (index, piece) in self.pieces.iter().enumerate() {
+            if rows.next_if(|&&row| row as usize == index).is_some() {
+                rebuilt.start_row();
+            }
+            put(*piece, &mut rebuilt.pieces);
+        }
+        rebuilt
     }
 
     fn emptied(&self) -> Self {
@@ -317,7 +308,7 @@ mod tests {
         Signal::new(&Schedule::from_record(&record, Between::Hold), &[0.0, 1.0, 2.0, 3.0, 4.0], 0.0)
     }
 
-    /// From 0 V the first tenth of the power's time takes a third of the voltage.
+    /// The first quarter of the time takes half of the voltage.
     #[test]
     fn charged_signal_follows_the_root_of_the_energy() {
         // 100 V hold 10 000 V^2.
