@@ -8,6 +8,8 @@ use simulation::record::{Record, Row};
 
 const ROWS: usize = 2000;
 const SAMPLE_S: f64 = 0.1;
+/// The nominal time constant, in s.
+const TAU_S: f64 = 5.5;
 /// Integration steps from row to row.
 const STEPS: usize = 100;
 /// Height of the first step, the largest.
@@ -15,15 +17,20 @@ const FULL_SCALE_V: f64 = 500.0;
 const FREQ_HZ: f64 = 0.73;
 
 /// Diagnoses the paper's spring under steps of 6 s, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
-/// and the one 1 ms ago, `added_v` what is added to the reading in a row at a response; all in V.
-fn diagnosed(amplified_v: impl Fn(f64, f64) -> f64, added_v: impl Fn(usize, f64) -> f64) -> Report {
+/// and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `added_v` what is added to the reading in a row at a response; all
+/// others in V.
+fn diagnosed(
+    amplified_v: impl Fn(f64, f64) -> f64,
+    tau_s: impl Fn(usize) -> f64,
+    added_v: impl Fn(usize, f64) -> f64,
+) -> Report {
     let mut seed = 11u32;
     let mut random = || {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(seed >> 8) / f64::from(1 << 24)
     };
     // Proportional gain 0.1, integral gain 0.2 per s.
-    let (share, tau_s) = (0.1 / 1.1, 5.5);
+    let share = 0.1 / 1.1;
     let (mut voltage_v, mut across_v, mut lag) = (0.0, 0.0, 0.0);
     let row = |row: usize| {
         let before_v = across_v;
@@ -35,7 +42,7 @@ fn diagnosed(amplified_v: impl Fn(f64, f64) -> f64, added_v: impl Fn(usize, f64)
         let response = share * if jumped_v == voltage_v { voltage_v } else { before_v } + (1.0 - share) * lag;
         for _ in 0..STEPS {
             across_v = amplified_v(voltage_v, across_v);
-            lag += (across_v - lag) * SAMPLE_S / STEPS as f64 / tau_s;
+            lag += (across_v - lag) * SAMPLE_S / STEPS as f64 / tau_s(row);
         }
         let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
         let measured = Some(response + added_v(row, response) + noise);
@@ -45,10 +52,14 @@ fn diagnosed(amplified_v: impl Fn(f64, f64) -> f64, added_v: impl Fn(usize, f64)
     examine(&record, &Options::default(), |_| ()).unwrap().report
 }
 
+fn ideal(voltage_v: f64, _: f64) -> f64 {
+    voltage_v
+}
+
 /// Diagnoses an ideal amplifier's spring with a sine of an amplitude that depends on row and response.
 fn with_hum(amplitude_v: impl Fn(usize, f64) -> f64) -> Report {
     let sine = |row: usize| (TAU * FREQ_HZ * SAMPLE_S * row as f64).sin();
-    diagnosed(|voltage_v, _| voltage_v, |row, response| amplitude_v(row, response) * sine(row))
+    diagnosed(ideal, |_| TAU_S, |row, response| amplitude_v(row, response) * sine(row))
 }
 
 /// Checks that a cause is all that is found, and that what is left is the noise. Returns one of its parameters.
@@ -107,8 +118,29 @@ fn an_amplifier_of_constant_power_has_a_bounded_rate() {
         let square = before_v * before_v;
         (square + (voltage_v * voltage_v - square).clamp(-most, most)).sqrt()
     };
-    let report = diagnosed(charged, |_, _| 0.0);
+    let report = diagnosed(charged, |_| TAU_S, |_, _| 0.0);
     let slew = of_only_finding(&report, "amplifier-slew", "slew_v_per_s");
     let exact = POWER_V2_PER_S / (2.0 * FULL_SCALE_V);
     assert!(slew.low < exact && exact < slew.high && slew.high - slew.low < 0.05 * exact, "{exact}: {slew:?}");
+}
+
+fn holds(report: &Report, name: &str, exact: f64) {
+    let parameter = of_only_finding(report, "time-constant", name);
+    assert!(parameter.low < exact && exact < parameter.high, "{name}: {exact}, {parameter:?}");
+    assert!(parameter.high - parameter.low < 0.15 * exact, "{name}: {parameter:?}");
+}
+
+#[test]
+fn a_time_constant_that_steps_has_two_values_and_a_time() {
+    let report = diagnosed(ideal, |row| if row < 1117 { TAU_S } else { 9.0 }, |_, _| 0.0);
+    holds(&report, "tau_first_s", TAU_S);
+    holds(&report, "tau_last_s", 9.0);
+    holds(&report, "at_s", 111.7);
+}
+
+#[test]
+fn a_time_constant_that_drifts_has_a_first_and_a_last_value() {
+    let report = diagnosed(ideal, |row| TAU_S * (4.0f64 / TAU_S).powf(row as f64 / ROWS as f64), |_, _| 0.0);
+    holds(&report, "tau_first_s", TAU_S);
+    holds(&report, "tau_last_s", 4.0);
 }

@@ -223,7 +223,7 @@ impl<'a> Chain<'a> {
     }
 
     /// Maps the settled stiffness to the stiffness, from an initial state. `applied` is the voltage on the electrodes; `levels_v`
-    /// receives its value in the middle of each piece if the time constant depends on the voltage. `other` is the stiffness from
+    /// receives what sets the time constant in each piece, if it varies by voltage or time. `other` is the stiffness from
     /// another initial state, if that is known. Returns the part of the signal that was simulated, 0 to 1: less than 1 where the
     /// initial state has decayed.
     pub fn relax(
@@ -234,8 +234,8 @@ impl<'a> Chain<'a> {
         levels_v: &mut Vec<f64>,
         other: Option<&Signal>,
     ) -> f64 {
-        if self.relaxation.varies() && self.relaxation.by_state.is_none() {
-            applied.middles(levels_v);
+        if self.relaxation.depends_on_levels() {
+            self.relaxation.levels_of(applied, levels_v);
         }
         self.add_from_before(applied, signal, start);
         let is_last = self.memory_behind.table().is_none() && self.law_behind.is_identity();
@@ -260,8 +260,8 @@ impl<'a> Chain<'a> {
         let law = Range::of(&signal);
         signal.map(|voltage| self.law.at(voltage));
         let mut levels_v = Vec::new();
-        if self.relaxation.varies() && self.relaxation.by_state.is_none() {
-            applied.middles(&mut levels_v);
+        if self.relaxation.depends_on_levels() {
+            self.relaxation.levels_of(&applied, &mut levels_v);
         }
         self.follow(&mut signal, &mut InitialState::at_rest(), &levels_v, None);
         Visited { voltage: Range::of(&applied), law, stiffness: Range::of(&signal) }

@@ -60,6 +60,9 @@ pub struct Relaxation {
     /// Set if the time constant depends on the spring's state instead of the voltage: the fraction of the remaining
     /// change that the state includes.
     pub by_state: Option<f64>,
+    /// Set if the time constant depends on the time instead of the voltage: begin and end of its change from `tau_s` to `tau_high_s`, in s
+    /// after the first row.
+    pub over_s: Option<[f64; 2]>,
     /// Time constant of the first lag while its output falls, in s; `None` if it is that while it rises.
     pub falling_tau_s: Option<f64>,
     /// Further lags, which act in parallel with the first.
@@ -83,6 +86,7 @@ impl Relaxation {
             tau_high_s: tau_s,
             geometric: false,
             by_state: None,
+            over_s: None,
             falling_tau_s: None,
             further: Default::default(),
             modes: [NO_MODE; PlantFile::MOST_MODES],
@@ -113,14 +117,15 @@ impl Relaxation {
 
     /// Writes the relaxation to a plant file.
     pub fn extend(&self, file: &mut PlantFile) {
-        // A file holds one time constant for both directions.
-        let mut tau_s = vec![self.falling_tau_s.map_or(self.tau_s, |falling_s| (self.tau_s * falling_s).sqrt())];
+        // A file holds one time constant for both directions, and none that changes with time: the last one is the spring's now.
+        let first_s = if self.over_s.is_some() { self.tau_high_s } else { self.tau_s };
+        let mut tau_s = vec![self.falling_tau_s.map_or(first_s, |falling_s| (first_s * falling_s).sqrt())];
         tau_s.extend(self.parts().map(|part| part.tau_s));
         let weights = match tau_s.len() {
             1 => Vec::new(),
             _ => std::iter::once(self.first_weight()).chain(self.parts().map(|part| part.part)).collect(),
         };
-        let tau_high_s = self.varies().then_some(self.tau_high_s);
+        let tau_high_s = (self.varies() && self.over_s.is_none()).then_some(self.tau_high_s);
         let tau_high_at_v = file.relaxation.tau_high_at_v;
         file.modes = self.oscillations().collect();
         file.relaxation = plant_file::Relaxation { share: self.share, tau_s, weights, tau_high_s, tau_high_at_v };
@@ -175,7 +180,7 @@ impl Relaxation {
         self.modes.into_iter().filter(contributes)
     }
 
-    /// Returns true if the time constant depends on the voltage.
+    /// Returns true if the time constant depends on the voltage, the spring's own state or the time.
     pub fn varies(&self) -> bool {
         self.tau_high_s != self.tau_s
     }
@@ -204,10 +209,34 @@ impl Relaxation {
         signal.pass(|piece| running.pass(piece, levels.next()));
     }
 
-    /// Returns the voltages in the middle of the pieces that set the time constant, in V; none if it does not depend on them.
+    /// Replaces the contents of `levels_v` by the voltage that sets the time constant in each piece of the voltage across the spring, in V.
+    /// For a change with time it grows from 0 V to [`Relaxation::HIGH_V`].
+    pub fn levels_of(&self, applied: &Signal, levels_v: &mut Vec<f64>) {
+        let Some([begin_s, end_s]) = self.over_s else { return applied.middles(levels_v) };
+        // Integral of the part of the change that is done, so that a change within a piece counts by its part of the piece.
+        let done = |time_s: f64| {
+            let within_s = time_s.clamp(begin_s, end_s) - begin_s;
+            0.5 * within_s * within_s / (end_s - begin_s).max(f64::MIN_POSITIVE) + (time_s - end_s).max(0.0)
+        };
+        let mut time_s = 0.0;
+        levels_v.clear();
+        levels_v.extend(applied.durations_s().map(|duration_s| {
+            let (from_s, to_s) = (time_s, time_s + duration_s);
+            time_s = to_s;
+            let part = if duration_s > 0.0 { (done(to_s) - done(from_s)) / duration_s } else { 0.0 };
+            part.clamp(0.0, 1.0) * Self::HIGH_V
+        }));
+    }
+
+    /// Returns those of the voltages that set the time constant, in V, on which it depends; none if it does not depend on them.
     pub fn levels(&self, levels_v: &[f64]) -> impl Iterator<Item = f64> {
-        let depends = self.varies() && self.by_state.is_none();
+        let depends = self.depends_on_levels();
         levels_v.iter().copied().filter(move |_| depends)
+    }
+
+    /// Returns true if the time constant depends on the voltage across the spring or the time.
+    pub fn depends_on_levels(&self) -> bool {
+        self.varies() && self.by_state.is_none()
     }
 
     /// Returns the number of steps of all lags over all pieces of a signal, of which a fraction is `irregular`: not as long as the piece

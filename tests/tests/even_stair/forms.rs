@@ -1,4 +1,4 @@
-//! Laws that depend on the state of the spring instead of the voltage, and ageing, which no cause describes.
+//! Laws that depend on the state of the spring instead of the voltage, and ageing.
 
 use super::{LEVELS_V, ROWS_PER_LEVEL, SAMPLE_S, causes, diagnosed, noise};
 
@@ -57,14 +57,23 @@ fn a_nonlinearity_after_the_relaxation_is_found() {
     }
 }
 
-/// A relaxation that slows down with time is not explained by a cause and must not be mistaken for autocorrelated
-/// noise.
 #[test]
-fn ageing_is_unexplained_and_not_consistent() {
+fn a_relaxation_that_slows_down_with_time_is_found() {
     for seed in 0..3 {
         let aged = 0.6 + 0.2 * seed as f64;
-        let report = diagnosis_of(seed + 30, |along, _, _| 5.5 * f64::exp(aged * (along - 0.5)), |y| y);
-        assert!(report["extended"]["rmse"].as_f64().unwrap() > 2.0, "{report}");
+        let tau = |along: f64| 5.5 * f64::exp(aged * (along - 0.5));
+        let parameters = [("tau_first_s", tau(0.0)), ("tau_last_s", tau(1.0))];
+        assert_explained(&diagnosis_of(seed + 30, |along, _, _| tau(along), |y| y), "time-constant", &parameters);
+    }
+}
+
+/// A relaxation that slows down and recovers is not explained by a cause and must not be mistaken for autocorrelated noise.
+#[test]
+fn ageing_and_recovery_are_unexplained_and_not_consistent() {
+    for seed in 0..3 {
+        let aged = 0.6 + 0.2 * seed as f64;
+        let bump = |along: f64| (std::f64::consts::PI * along).sin() - 0.5;
+        let report = diagnosis_of(seed + 40, |along, _, _| 5.5 * f64::exp(aged * bump(along)), |y| y);
         assert_eq!(report["verdict"], "unexplained", "{report}");
     }
 }
