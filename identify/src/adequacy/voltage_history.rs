@@ -8,7 +8,7 @@
 //! | earlier voltages | `u`, `x_k`, and the lags of the voltage's absolute changes |
 //! | levels | powers and products of `u` and `x_k`; triangles over the range of `u` and of the nominal lag `x` |
 //! | direction | `play(u) - u` and `play(x) - x` at five widths; `|d|`, `d |d|`, `d^3` of the difference `d = u - x` |
-//! | ageing | `u` and `x` times `s`, `s^2` and `ln(1 + 9 s)` |
+//! | ageing | `u` and `x` times `s`, `s^2` and `ln(1 + 9 s)`; the sensitivity of `x` to its time constant, times `s`, `s^2` and `s^3` |
 
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece};
@@ -85,6 +85,9 @@ pub(super) fn columns(data: &Data, tau_s: f64) -> Vec<Column> {
     add(ageing, each(&|row| s(row) * x[row]));
     add(ageing, each(&|row| s(row).powi(2) * x[row]));
     add(ageing, each(&|row| (9.0 * s(row)).ln_1p() * x[row]));
+    // The lag of the lag, less the lag: the derivative of the lag by the logarithm of its time constant.
+    let slower = lagged(data, &x, tau_s, start);
+    (1..=3).for_each(|power| add(ageing, each(&|row| s(row).powi(power) * (slower[row] - x[row]))));
     columns
 }
 
