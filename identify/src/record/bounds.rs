@@ -62,7 +62,11 @@ impl Bounds {
         }
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
-        let most_repeated = counts.iter().skip(1).rev().skip(1).map(|(_, count)| *count).max().unwrap_or(1);
+        let inner = counts.iter().skip(1).rev().skip(1);
+        let most_repeated = inner.clone().map(|(_, count)| *count).max().unwrap_or(1);
+        // A sensor that hangs repeats one; a running median or a sensor that is read too often repeats many.
+        let stands_out =
+            |count: usize| inner.clone().filter(|(value, times)| *value != 0.0 && *times >= count).count() <= 1;
         let far = CLOSE_TO_BOUND.get() * scatter;
         let is_fine = step.is_some_and(|step| step < COARSE.get() * scatter);
         let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
@@ -70,7 +74,8 @@ impl Bounds {
             // On a fine grid the next step is a fair judge. On a coarse one every level at which the spring settles repeats one reading,
             // and without one any reading may often be the same.
             let compared = if is_fine { next.map_or(1, |next| next.1) } else { most_repeated };
-            let piled = count >= FEWEST_TIES.count() && (continuous || count >= BOUND_TO_NEXT_STEP.count() * compared);
+            let piled = count >= FEWEST_TIES.count()
+                && (continuous && stands_out(count) || count >= BOUND_TO_NEXT_STEP.count() * compared);
             // A spring at rest reads exactly zero many times.
             (piled && count < readings.len() && value != 0.0 && stays(readings, value, far)).then_some(value)
         };
@@ -130,6 +135,13 @@ mod tests {
             assert_eq!(upper(seed, |read| median(length, read)), None, "{seed}, {length}");
         }
         assert_eq!(upper(0, |read| stopped(median(15, read))), Some(350.0));
+        // Of a voltage that rises and falls few are: those around its turning points.
+        let triangle = |row: usize| 2.0 * (row as i64 % 200 - 100).unsigned_abs() as f64;
+        for (seed, length) in (0..20).flat_map(|seed| [5, 9, 17].map(|length| (seed, length))) {
+            let noise = &normals(1200 * (seed + 1))[1200 * seed..];
+            let read = (0..1200).map(|row| triangle(row) + noise[row]).collect();
+            assert_eq!(Bounds::of_file(&median(length, read)), Bounds::default(), "{seed}, {length}");
+        }
         // A counter of periods has steps that grow with the reading, and two codes for the highest level, one of them seldom.
         let counted =
             |read: Vec<f64>| read.into_iter().map(|y| 30_199.0 / (30_199.0 / (y + 200.0)).round() - 200.0).collect();
