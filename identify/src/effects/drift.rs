@@ -13,6 +13,7 @@ use std::f64::consts::TAU;
 
 use crate::dimension::Dimension;
 use crate::effects::boundary;
+use crate::effects::drive::Drive;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, logarithms};
 use crate::record::data::Data;
 use crate::record::spectrum;
@@ -33,6 +34,8 @@ const FEWEST_PERIODS_OF_WAVE: f64 = 0.75;
 /// Intervals between the numbers of periods of initial waves, of which the best are tried.
 const INITIAL_PERIODS: f64 = 0.5;
 const INITIAL_WAVES: usize = 2;
+/// A wave is not looked for where the voltage drives the spring this near to it, in periods per record, from where a fit would get there.
+const BESIDE_DRIVEN: [f64; 3] = [-1.0, 0.0, 1.0];
 /// Approximate number of rows in which initial waves are looked for.
 const ROWS_OF_WAVES: usize = 400;
 /// Number of times of a settling at initial points, and the longest time, in durations of the record.
@@ -74,7 +77,11 @@ fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) ->
     let most = (FEWEST_PERIODS.get() / INITIAL_PERIODS) as usize;
     let mut waves: Vec<(f64, Vec<f64>)> = (2..most).map(wave).filter(|(gain, _)| gain.is_finite()).collect();
     waves.sort_by(|a, b| b.0.total_cmp(&a.0));
-    waves.into_iter().take(INITIAL_WAVES).map(|(_, point)| point).collect()
+    let drive = Drive::of(data);
+    let apart = |point: &Vec<f64>| {
+        !BESIDE_DRIVEN.iter().any(|periods| drive.reaches(point[0] + periods / data.duration_s().max(1e-9)))
+    };
+    waves.into_iter().map(|(_, point)| point).filter(apart).take(INITIAL_WAVES).collect()
 }
 
 /// Returns the row from which on a factor other than 1 reduces the squared error most, and the factor less 1; NaN rows do not count.
@@ -252,6 +259,40 @@ impl Effect for Drift {
                 EXPONENTIAL => *reading *= grown.exp(),
                 _ => *reading += grown * data.full_scale_v,
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    const SECONDS: f64 = 240.0;
+
+    /// Numbers of periods of the initial waves of a gain that oscillates `periods` times, under a voltage that does so `driven` times.
+    fn found(driven: f64, periods: f64) -> Vec<f64> {
+        let wave = |count: f64, time_s: f64| (TAU * count * time_s / SECONDS).sin();
+        let row = |row: usize| {
+            let time_s = 0.1 * row as f64;
+            let voltage_v = 250.0 + 200.0 * wave(driven, time_s);
+            Row { line: row, time_s, voltage_v, measured: Some(voltage_v) }
+        };
+        let record = Record { name: String::new(), rows: (0..2400).map(row).collect() };
+        let data = Data::new(&record, Input::Hold);
+        let drifts = |(reading, time_s): (&f64, &f64)| 0.05 * reading * wave(periods, *time_s);
+        let residual: Vec<f64> = data.reading.iter().zip(&data.time_s).map(drifts).collect();
+        let waves = initial_waves(WAVE, &FitContext { data: &data, residual: &residual, sigma: 1.0 });
+        waves.iter().map(|point| point[0] * SECONDS).collect()
+    }
+
+    #[test]
+    fn no_wave_begins_where_the_voltage_drives_the_spring() {
+        assert!(found(31.0, 4.0).iter().any(|periods| (periods - 4.0).abs() < 0.6));
+        for periods in [3.5, 4.0, 4.5] {
+            let all = found(4.0, periods);
+            assert!(!all.is_empty() && all.iter().all(|found| (found - 4.0).abs() > 1.0), "{all:?}");
         }
     }
 }

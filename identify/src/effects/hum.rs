@@ -13,11 +13,11 @@ use std::ops::{Range, RangeInclusive};
 
 use crate::dimension::Dimension;
 use crate::effects::boundary;
+use crate::effects::drive::Drive;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::effects::hum_envelope::{self, KNOTS, POWERS, over_response, over_time};
 use crate::record::data::Data;
 use crate::record::spectrum::{self, Peak};
-use crate::stats::scale::centred;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{FEWEST_PERIODS, LINE_TO_NEIGHBOURS};
 
@@ -41,20 +41,6 @@ const LINE_STEP: f64 = 0.1;
 const SIDE_LINES: i32 = KNOTS as i32 / 2;
 /// Fewest periods from one knot of a varying amplitude to the next: with fewer it would follow what is not periodic.
 const PERIODS_PER_KNOT: f64 = 2.0;
-
-/// Multiples of a frequency of the voltage that the response to it has.
-const MULTIPLES: [f64; 3] = [1.0, 2.0, 3.0];
-/// Part of the voltage's mean square in a sine from which the voltage is one. Half a period more or less in the record leaves 0.4 of it.
-const PART_OF_SINE: f64 = 0.25;
-
-/// Returns true if a frequency is one at which the voltage, less its mean, drives the spring, or a multiple of it: no record can tell a
-/// disturbance from the response there.
-fn is_driven(frequency_hz: f64, voltage: &[f64], data: &Data) -> bool {
-    MULTIPLES.iter().any(|multiple| {
-        let line = spectrum::line(voltage, data, frequency_hz / multiple);
-        0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(voltage, voltage)
-    })
-}
 
 /// Returns the number of sines of a form.
 fn sines(form: usize) -> usize {
@@ -177,12 +163,12 @@ impl Effect for Hum {
             STRETCH => in_stretch(peak.frequency_hz, residual, data),
             _ => Some(constant(peak)),
         };
-        let voltage = centred(&data.voltage_v);
+        let drive = Drive::of(data);
         let fewest = if form == VARYING { PERIODS_PER_KNOT * KNOTS as f64 } else { 0.0 };
         peaks
             .into_iter()
             .filter(|peak| peak.frequency_hz > fewest.max(FEWEST_PERIODS.get()) / data.duration_s())
-            .filter(|peak| !is_driven(peak.frequency_hz, &voltage, data))
+            .filter(|peak| !drive.reaches(peak.frequency_hz))
             .filter_map(start)
             .collect()
     }

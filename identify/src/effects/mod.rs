@@ -13,6 +13,7 @@ mod catalogue;
 mod charge_leakage;
 mod delay;
 mod drift;
+mod drive;
 pub mod effect;
 mod gain_error;
 mod hum;
