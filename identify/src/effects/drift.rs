@@ -35,7 +35,7 @@ const FEWEST_PERIODS_OF_WAVE: f64 = 0.75;
 const INITIAL_PERIODS: f64 = 0.5;
 const INITIAL_WAVES: usize = 2;
 /// A wave is not looked for where the voltage drives the spring this near to it, in periods per record, from where a fit would get there.
-const BESIDE_DRIVEN: [f64; 3] = [-1.0, 0.0, 1.0];
+const BESIDE_DRIVEN: [f64; 3] = [-0.5, 0.0, 0.5];
 /// Approximate number of rows in which initial waves are looked for.
 const ROWS_OF_WAVES: usize = 400;
 /// Number of times of a settling at initial points, and the longest time, in durations of the record.
@@ -79,7 +79,7 @@ fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) ->
     waves.sort_by(|a, b| b.0.total_cmp(&a.0));
     let drive = Drive::of(data);
     let apart = |point: &Vec<f64>| {
-        !BESIDE_DRIVEN.iter().any(|periods| drive.reaches(point[0] + periods / data.duration_s().max(1e-9)))
+        !BESIDE_DRIVEN.iter().any(|periods| drive.is_at(point[0] + periods / data.duration_s().max(1e-9)))
     };
     waves.into_iter().map(|(_, point)| point).filter(apart).take(INITIAL_WAVES).collect()
 }

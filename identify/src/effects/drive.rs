@@ -22,13 +22,16 @@ impl<'a> Drive<'a> {
         Self { data, voltage: centred(&data.voltage_v) }
     }
 
-    /// Returns true if the voltage drives the spring at a frequency, in Hz, or if that is a multiple of one: no record can tell what has
-    /// this frequency by itself from the response there.
-    pub(super) fn reaches(&self, frequency_hz: f64) -> bool {
+    /// Returns true if the voltage is a sine of a frequency, in Hz, to a part: no record can tell what has this frequency by itself from
+    /// the response there.
+    pub(super) fn is_at(&self, frequency_hz: f64) -> bool {
         let Self { data, voltage } = self;
-        MULTIPLES.iter().any(|multiple| {
-            let line = spectrum::line(voltage, data, frequency_hz / multiple);
-            0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(voltage, voltage)
-        })
+        let line = spectrum::line(voltage, data, frequency_hz);
+        0.5 * (line.cosine.powi(2) + line.sine.powi(2)) * data.rows() as f64 > PART_OF_SINE * dot(voltage, voltage)
+    }
+
+    /// Returns true if a frequency, in Hz, is a multiple of one at which the voltage drives the spring, or is one itself.
+    pub(super) fn reaches(&self, frequency_hz: f64) -> bool {
+        MULTIPLES.iter().any(|multiple| self.is_at(frequency_hz / multiple))
     }
 }

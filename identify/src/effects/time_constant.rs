@@ -32,7 +32,7 @@ const INITIAL_CHANGES_S: [[f64; 2]; 10] = [
     [13.5, 8.5],
 ];
 /// Number of times of a step at initial points, which divide the record equally.
-const INITIAL_TIMES: u32 = 59;
+const INITIAL_TIMES: u32 = 29;
 
 impl Effect for TimeConstant {
     fn cause(&self) -> &'static str {

@@ -249,7 +249,7 @@ fn extensions(
         return rare;
     }
     let mut found = screening.extensions(engine, forms, wanted, least);
-    if exhaustive && fit.model.blocks.is_empty() {
+    if exhaustive && fit.model.blocks.is_empty() && engine.doubts(fit) {
         // Before all common forms are fitted in vain.
         let best = found.iter().map(|it| it.predicted_gain).fold(0.0, f64::max);
         let mut rare = rare(screening.extensions(engine, Forms::Rare, wanted, least));
