@@ -60,9 +60,10 @@ fn settling_times(data: &Data) -> (f64, f64) {
 /// Returns the initial waves that explain most of the residual, as frequency, cosine and sine; a part of the rows shows so slow ones.
 fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) -> Vec<Vec<f64>> {
     let every = data.rows().div_ceil(ROWS_OF_WAVES);
+    let duration_s = data.duration_s().max(1e-9);
     let carrier = |row: usize| if form == WAVE { data.reading[row] } else { data.full_scale_v };
     let wave = |count: usize| {
-        let frequency = INITIAL_PERIODS * count as f64 / data.duration_s().max(1e-9);
+        let frequency = INITIAL_PERIODS * count as f64 / duration_s;
         let [mut cc, mut ss, mut cs, mut c, mut s] = [0.0; 5];
         for row in (0..data.rows()).step_by(every) {
             let (sin, cos) = (TAU * frequency * (data.time_s[row] - data.time_s[0])).sin_cos();
@@ -78,9 +79,7 @@ fn initial_waves(form: usize, FitContext { data, residual, .. }: &FitContext) ->
     let mut waves: Vec<(f64, Vec<f64>)> = (2..most).map(wave).filter(|(gain, _)| gain.is_finite()).collect();
     waves.sort_by(|a, b| b.0.total_cmp(&a.0));
     let drive = Drive::of(data);
-    let apart = |point: &Vec<f64>| {
-        !BESIDE_DRIVEN.iter().any(|periods| drive.is_at(point[0] + periods / data.duration_s().max(1e-9)))
-    };
+    let apart = |point: &Vec<f64>| !BESIDE_DRIVEN.iter().any(|periods| drive.is_at(point[0] + periods / duration_s));
     waves.into_iter().map(|(_, point)| point).filter(apart).take(INITIAL_WAVES).collect()
 }
 
