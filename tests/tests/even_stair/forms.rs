@@ -74,6 +74,7 @@ fn ageing_and_recovery_are_unexplained_and_not_consistent() {
         let aged = 0.6 + 0.2 * seed as f64;
         let bump = |along: f64| (std::f64::consts::PI * along).sin() - 0.5;
         let report = diagnosis_of(seed + 40, |along, _, _| 5.5 * f64::exp(aged * bump(along)), |y| y);
+        assert!(report["extended"]["rmse"].as_f64().unwrap() > 1.1, "{report}");
         assert_eq!(report["verdict"], "unexplained", "{report}");
     }
 }
