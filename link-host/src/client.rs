@@ -143,6 +143,18 @@ impl Client {
         Ok(())
     }
 
+    /// Restarts the MCU and asks it for a new session. The MCU then numbers its reports of faults from 1 again, so that those received
+    /// before are not confirmed to it any more.
+    pub(crate) fn restart(&mut self) -> Result<(), Failure> {
+        match self.exchange(Request::Restart)? {
+            Reply::Ack { .. } => {}
+            other => return Err(Failure::unexpected(other)),
+        }
+        self.begin()?;
+        self.unheard.clear();
+        Ok(())
+    }
+
     /// Sends a request of the session, after what it needs: a new session when the numbers run out, and the word that the
     /// reported faults were heard.
     pub(crate) fn ask(&mut self, request: Request) -> Result<Reply, Failure> {
@@ -272,7 +284,8 @@ mod tests {
     /// which reports of faults are repeated in each. `standing` is the faults that stand in a tick. The settings have no end.
     fn mcu(listener: UnixListener, standing: fn(u64) -> Faults) -> Counters {
         let spring = Spring::new(YoungsModulus::PAPER, Cantilever::PAPER, 0.0, 700.0).unwrap();
-        let mut server = Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 10, ..About::default() });
+        let started = || Server::new(spring, About { silence_limit_ticks: 1000, rate_hz: 10, ..About::default() });
+        let mut server = started();
         let mut sample = Telemetry::default();
         let (mut stream, _) = listener.accept().unwrap();
         let mut bytes = [0; 256];
@@ -293,6 +306,10 @@ mod tests {
                     Some(Step::ReadSettings { number, .. }) => {
                         let part = Part { number, length: u16::MAX, bytes: [0; PART] };
                         stream.write_all(server.settings_part(part)).unwrap();
+                    }
+                    Some(Step::Restart(answer)) => {
+                        stream.write_all(answer).unwrap();
+                        server = started();
                     }
                     _ => {}
                 }
@@ -356,6 +373,21 @@ mod tests {
         drop(client);
         let counters = thread.join().unwrap();
         assert_eq!((counters.out_of_order, counters.unknown), (0, 0));
+    }
+
+    /// The MCU that has restarted knows neither the session nor the report.
+    #[test]
+    fn a_fault_that_is_reported_with_the_answer_to_a_restart_is_shown_and_forgotten() {
+        let (mut client, thread) = connected(|tick| match tick {
+            3 => Faults::NONE.with(Fault::Interlock),
+            _ => Faults::NONE,
+        });
+        client.restart().unwrap();
+        assert_eq!(client.reports().iter().map(|report| report.number).collect::<Vec<_>>(), [1]);
+        client.order(Request::Heartbeat).unwrap();
+        assert!(client.unheard.is_empty(), "{:?}", client.unheard);
+        drop(client);
+        thread.join().unwrap();
     }
 
     /// Between a report and the answer to its Heard the MCU repeats it, also with other faults that stand by then.

@@ -182,8 +182,7 @@ impl Client {
             Block::Model => Request::ModelEnd { length, checksum },
             Block::Settings => Request::SettingsEnd { length, checksum },
         })?;
-        self.order(Request::Restart)?;
-        self.begin()?;
+        self.restart()?;
         let (what, blocks) = match block {
             Block::Model => ("model", self.models()?),
             Block::Settings => ("settings", self.settings()?),
