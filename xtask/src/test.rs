@@ -19,9 +19,8 @@ const FIRST: &[Step] = &[Step::new("format", &["fmt", "--all", "--check"])];
 /// out without it. Of the six images `boot` runs the first and one that differs from it in everything.
 const LANES: Lanes = Lanes {
     build: Step::new("build", &["build", "--quiet", "--workspace", "--lib", "--bins", "--tests", "--examples"]),
+    // The longest step by far, and on one core most of the time: it begins as soon as it can.
     host: &[
-        Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
-        Step::new("document", &["doc", "--no-deps", "--workspace"]).with("RUSTDOCFLAGS", "-Dwarnings"),
         // The same random cases in every run, so that it judges the change alone; `cargo test` by itself draws new ones.
         Step::new("test", &["test", "--workspace"]).with("PROPTEST_RNG_SEED", "1"),
     ],
@@ -33,6 +32,8 @@ const LANES: Lanes = Lanes {
         Step::xtask("prove", &["prove", "--ticks", "1000000"]),
         // Of the page only this is compiled here: what is left out for a browser must not be missed there.
         Step::new("lint page", &["clippy", "--quiet", "-ppage", "--lib", "--target", page::WASM, "--", "-Dwarnings"]),
+        Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
+        Step::new("document", &["doc", "--no-deps", "--workspace"]).with("RUSTDOCFLAGS", "-Dwarnings"),
         // In the profile of `build`, whose dependencies it takes.
         Step::xtask("package", &["python", "--only", "install", "--profile", "dev"]),
     ],
