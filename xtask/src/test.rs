@@ -34,7 +34,7 @@ const LANES: Lanes = Lanes {
         Step::new("lint page", &["clippy", "--quiet", "-ppage", "--lib", "--target", page::WASM, "--", "-Dwarnings"]),
         Step::new("lint host", &["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]),
         Step::new("document", &["doc", "--no-deps", "--workspace"]).with("RUSTDOCFLAGS", "-Dwarnings"),
-        // In the profile of `build`, whose dependencies it takes.
+        // In the profile of `build`: of its dependencies it takes those with the same features.
         Step::xtask("package", &["python", "--only", "install", "--profile", "dev"]),
     ],
     built: &[
