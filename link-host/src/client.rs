@@ -146,10 +146,7 @@ impl Client {
     /// Restarts the MCU and asks it for a new session. The MCU then numbers its reports of faults from 1 again, so that those received
     /// before are not confirmed to it any more.
     pub(crate) fn restart(&mut self) -> Result<(), Failure> {
-        match self.exchange(Request::Restart)? {
-            Reply::Ack { .. } => {}
-            other => return Err(Failure::unexpected(other)),
-        }
+        self.order(Request::Restart)?;
         self.begin()?;
         self.unheard.clear();
         Ok(())
@@ -172,7 +169,8 @@ impl Client {
             }
         }
         let reply = self.exchange(request);
-        if matches!(reply, Ok(_) | Err(Failure::Refused(_))) {
+        let restarts = request == Request::Restart && reply.is_ok();
+        if !restarts && matches!(reply, Ok(_) | Err(Failure::Refused(_))) {
             // One that arrives meanwhile is for the next request.
             for number in self.unheard.iter().map(|report| report.number).collect::<Vec<_>>() {
                 let heard = self.exchange(Request::Heard { number });
@@ -383,6 +381,7 @@ mod tests {
             _ => Faults::NONE,
         });
         client.restart().unwrap();
+        assert!(client.unheard.is_empty(), "{:?}", client.unheard);
         assert_eq!(client.reports().iter().map(|report| report.number).collect::<Vec<_>>(), [1]);
         client.order(Request::Heartbeat).unwrap();
         assert!(client.unheard.is_empty(), "{:?}", client.unheard);
