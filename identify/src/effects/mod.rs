@@ -24,6 +24,7 @@ mod instantaneous_share;
 pub mod model;
 mod offset_levels;
 mod outliers;
+mod passing_shift;
 mod quantisation;
 mod reading_offset;
 mod resonance;

@@ -1,26 +1,32 @@
-//! Readings are shifted by a constant.
+//! Readings are shifted.
 //!
 //! | form | |
 //! | --- | --- |
 //! | run | one interval of them |
 //! | whole | all of them: the sensor's zero |
 //! | levels | several stretches, each by a constant of its own ([`offset_levels`](super::offset_levels)) |
+//! | decay | from one row on, by a shift that decays exponentially ([`passing_shift`](super::passing_shift)) |
+//! | ramps | a stretch of rows, by a shift that comes and goes by straight ramps |
 
 use crate::dimension::Dimension;
+use crate::effects::boundary;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::effects::offset_levels::{Stretch, stretches};
+use crate::effects::passing_shift::{Ramped, best_decay, best_ramps, times_s};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
 use crate::stats::shifted_run::{ShiftedRun, shifted_runs};
 use crate::stats::thresholds::empirical::{PRICE_OF_RUN, ROWS_FOR_ZERO};
-use crate::stats::thresholds::probability::{NATS_WITHIN_INTERVAL, Z_ZERO};
+use crate::stats::thresholds::probability::Z_ZERO;
 
 pub(super) struct ReadingOffset;
 
 const RUN: usize = 0;
 const WHOLE: usize = 1;
 const LEVELS: usize = 2;
+const DECAY: usize = 3;
+const RAMPS: usize = 4;
 /// Largest number of stretches with a level of their own.
 const MOST_STRETCHES: usize = 16;
 /// Fewest stretches that are more than one shifted run.
@@ -47,17 +53,32 @@ fn stretches_of(point: &[f64], rows: usize) -> impl Iterator<Item = Stretch> {
 }
 
 /// Returns the rows that are shifted and the shift, in V: rows from `point[0]` up to but not including `point[1]` by `point[2]`, all by
-/// `point[0]`, or of several stretches the one that is shifted most.
+/// `point[0]`, or of several stretches the one that is shifted most. A shift that passes is given by its largest value.
 fn shifted(form: usize, point: &[f64], rows: usize) -> (std::ops::Range<usize>, f64) {
     if form == WHOLE {
         return (0..rows, point[0]);
+    }
+    if form == DECAY {
+        return ((point[0] as usize).min(rows)..rows, point[2]);
     }
     if form == LEVELS {
         let far = stretches_of(point, rows).max_by(|a, b| a.level.abs().total_cmp(&b.level.abs()));
         return far.map_or((0..0, 0.0), |far| (far.from..far.to, far.level));
     }
     let to = (point[1] as usize).min(rows);
-    ((point[0] as usize).min(to)..to, point[2])
+    ((point[0] as usize).min(to)..to, point[if form == RAMPS { 4 } else { 2 }])
+}
+
+/// Returns the point of a shift that passes and explains most; one of several records is not looked for.
+fn passing(form: usize, context: &FitContext) -> Option<Vec<f64>> {
+    if context.data.is_joined() {
+        return None;
+    }
+    if form == DECAY {
+        return best_decay(context);
+    }
+    let (Ramped { from, to, ramps: [first, last] }, shift) = best_ramps(context)?;
+    Some(vec![from as f64, to as f64, first, last, shift])
 }
 
 /// Returns false if the readings before the first voltage show that the sensor's zero is right.
@@ -99,7 +120,7 @@ impl Effect for ReadingOffset {
     }
 
     fn forms(&self) -> usize {
-        3
+        5
     }
 
     fn common_forms(&self) -> usize {
@@ -114,6 +135,14 @@ impl Effect for ReadingOffset {
         match form {
             RUN => vec![Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, rows), offset],
             LEVELS => [Coordinate::fixed(0.0, rows), offset].map(|it| vec![it; MOST_STRETCHES]).concat(),
+            DECAY => {
+                let (shortest, longest) = times_s(data);
+                vec![Coordinate::fixed(0.0, rows), Coordinate::log(shortest, longest), offset]
+            }
+            RAMPS => {
+                let (edge, ramp) = (Coordinate::fixed(0.0, rows), Coordinate::fixed(0.0, 0.5));
+                vec![edge, edge, ramp, ramp, offset]
+            }
             _ => vec![Coordinate::new(-most + 2.0 * start.min(0.0), most + 2.0 * start.max(0.0))],
         }
     }
@@ -126,6 +155,7 @@ impl Effect for ReadingOffset {
                 let several = (found.len() >= FEWEST_STRETCHES).then(|| levels(context.data.rows(), &found));
                 several.into_iter().collect()
             }
+            DECAY | RAMPS => passing(form, context).into_iter().collect(),
             // The zero of an identified spring is estimated with every set of causes.
             _ if !context.data.normalisation.identified && shows_at_rest(context.data) => {
                 vec![vec![-context.sigma], vec![context.sigma]]
@@ -141,13 +171,18 @@ impl Effect for ReadingOffset {
             let shifts = stretches_of(point, data.rows()).count() as f64;
             Quantity::new("levels", Dimension::Ratio, shifts)
         });
-        let mut quantities = vec![
-            Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]),
-            Quantity::new("to_s", Dimension::TimePoint, data.time_s[run.end.saturating_sub(1).min(last)]),
-            Quantity::new("offset", Dimension::ReadingDifference, offset),
-        ];
-        quantities.extend(count);
-        quantities
+        let to = |row: usize| Quantity::new("to_s", Dimension::TimePoint, data.time_s[row.min(last)]);
+        let ends = match form {
+            DECAY => Quantity::new("decay_s", Dimension::Time, point[1].exp()),
+            _ => to(run.end.saturating_sub(1)),
+        };
+        let length_s = data.time_s[run.end.min(last)] - data.time_s[run.start.min(last)];
+        let parts = if form == RAMPS { &point[2..4] } else { &[] };
+        let ramps = ["rise_s", "fall_s"].into_iter().zip(parts);
+        let ramps = ramps.map(|(name, part)| Quantity::new(name, Dimension::Time, part * length_s));
+        let from = Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]);
+        let offset = Quantity::new("offset", Dimension::ReadingDifference, offset);
+        [from, ends, offset].into_iter().chain(count).chain(ramps).collect()
     }
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
@@ -157,6 +192,7 @@ impl Effect for ReadingOffset {
             RUN => run,
             // A run has two edges.
             LEVELS => 0.5 * MOST_STRETCHES as f64 * run,
+            DECAY | RAMPS => run,
             _ => 0.0,
         }
     }
@@ -170,6 +206,12 @@ impl Effect for ReadingOffset {
             point.copy_from_slice(&levels(context.data.rows(), &stretches(context.residual, MOST_STRETCHES)));
             return;
         }
+        if matches!(form, DECAY | RAMPS) {
+            if let Some(best) = passing(form, context) {
+                point.copy_from_slice(&best);
+            }
+            return;
+        }
         let [by_level, by_edges] = best_runs(context);
         // A run that was placed by its edges stays near them.
         let by_edges = by_edges.filter(|run| run[0] < point[1] && point[0] < run[1]);
@@ -180,35 +222,23 @@ impl Effect for ReadingOffset {
         }
     }
 
-    /// An edge may move as long as that costs less than [`NATS_WITHIN_INTERVAL`] (95 %), and lies between two rows.
+    /// An edge lies between two rows.
     fn searched_range(&self, form: usize, point: &[f64], context: &FitContext) -> Vec<(String, f64, f64)> {
-        if form != RUN {
+        let FitContext { data, residual, sigma } = context;
+        if !matches!(form, RUN | DECAY) {
             return Vec::new();
         }
-        let (time, rows) = (&context.data.time_s, context.data.rows());
-        let (from, to, offset) = (point[0] as usize, (point[1] as usize).min(rows), point[2]);
-        // Cost of excluding a row from the run, in nats; including one costs the negative.
-        let cost =
-            |row: usize| (context.residual[row] * offset - 0.5 * offset * offset) / (context.sigma * context.sigma);
-        let reach = |outwards: &mut dyn Iterator<Item = usize>, sign: f64| {
-            let (mut sum, mut last) = (0.0, None);
-            for row in outwards.take(200) {
-                sum += sign * cost(row);
-                if sum < NATS_WITHIN_INTERVAL {
-                    last = Some(row);
-                }
-                if sum > 8.0 {
-                    break;
-                }
-            }
-            last
-        };
-        let at = |row: usize| time[row.min(rows - 1)];
-        let lower = reach(&mut (0..from).rev(), -1.0).unwrap_or(from).saturating_sub(1);
-        let upper = reach(&mut (from..to), 1.0).map_or(from, |row| row + 1);
-        let earlier = reach(&mut (from..to).rev(), 1.0).unwrap_or(to).saturating_sub(1);
-        let later = reach(&mut (to..rows), -1.0).map_or(to, |row| row + 1);
-        vec![("from_s".into(), at(lower), at(upper)), ("to_s".into(), at(earlier.saturating_sub(1)), at(later))]
+        let rows = data.rows();
+        let (run, offset) = shifted(form, point, rows);
+        // Cost of excluding a row, in nats; including one costs the negative.
+        let cost = |row: usize| offset * (residual[row] - 0.5 * offset) / (sigma * sigma);
+        let from = boundary::range(run.start.min(rows - 1), rows, |row| -cost(row), cost);
+        let from = ("from_s".to_owned(), data.time_s[*from.start()], data.time_s[*from.end()]);
+        let to = (form == RUN).then(|| {
+            let to = boundary::range(run.end, rows, cost, |row| -cost(row));
+            ("to_s".to_owned(), data.time_s[to.start().saturating_sub(1)], data.time_s[*to.end()])
+        });
+        [from].into_iter().chain(to).collect()
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], data: &Data, readings: &mut [f64]) {
@@ -219,8 +249,15 @@ impl Effect for ReadingOffset {
             return;
         }
         let (run, offset) = shifted(form, point, data.rows());
-        for reading in &mut readings[run] {
-            *reading += offset;
+        let begins_s = data.time_s[run.start.min(data.rows() - 1)];
+        let ramps = [2, 3].map(|ramp| if form == RAMPS { point[ramp] } else { 0.0 });
+        let ramped = Ramped { from: run.start, to: run.end, ramps };
+        for row in run.clone() {
+            readings[row] += match form {
+                DECAY => offset * (-(data.time_s[row] - begins_s) / point[1].exp()).exp(),
+                RAMPS => offset * ramped.at(row),
+                _ => offset,
+            };
         }
     }
 }

@@ -116,6 +116,9 @@ thresholds! {
     SHORTEST_RUN = 5.0, "rows";
     /// Price of the places of a run of shifted readings; neighbouring runs are nearly equivalent.
     PRICE_OF_RUN = 1.25, "nats for each unit of ln(rows)";
+    /// Smallest part of what the errors have beyond noise that a shift which decays, or comes and goes by ramps, has to explain; a curve of
+    /// another cause is explained in part.
+    MOST_OF_STRUCTURE = 0.7, "of the sum of squares beyond noise";
     /// Errors are clipped here when the run of shifted readings is searched.
     CLIP_FOR_RUN = 6.0, "scales of the noise";
     /// Autocorrelation of errors from which they are whitened when the run is searched.
