@@ -1,11 +1,21 @@
-//! The amplifier's voltage saturates below the command: `|u| = min(|command|, limit)`.
+//! The amplifier's voltage saturates below the command.
+//!
+//! | form | |
+//! | --- | --- |
+//! | sharp | `u = min(command, limit)` in magnitude |
+//! | with a knee | the same, [approached gradually](crate::plant::knee) |
 
 use crate::dimension::Dimension;
-use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
+use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct AmplifierLimit;
+
+const WITH_KNEE: usize = 1;
+/// Bounds of a knee, relative to the full scale, and the one that is tried.
+const KNEES: (f64, f64) = (0.003, 0.15);
+const INITIAL_KNEE: f64 = 0.03;
 
 impl Effect for AmplifierLimit {
     fn cause(&self) -> &'static str {
@@ -24,26 +34,41 @@ impl Effect for AmplifierLimit {
         "a stair in small steps up to the full voltage: above the limit nothing changes any more, not even the instantaneous part"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
-        vec![Coordinate::new(0.05 * data.full_scale_v, data.full_scale_v)]
+    fn forms(&self) -> usize {
+        2
     }
 
-    fn initial_points(&self, _: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
-        (1..20)
-            .map(|part| vec![data.full_scale_v * (1.0 - 0.04 * f64::from(part))])
-            .chain([vec![0.985 * data.full_scale_v]])
-            .collect()
+    fn common_forms(&self) -> usize {
+        1
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("limit_v", Dimension::Voltage, point[0])]
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        let limit = Coordinate::new(0.05 * data.full_scale_v, data.full_scale_v);
+        let knee = Coordinate::log(KNEES.0 * data.full_scale_v.max(1.0), KNEES.1 * data.full_scale_v.max(1.0));
+        if form == WITH_KNEE { vec![limit, knee] } else { vec![limit] }
     }
 
-    fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
-        None
+    fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
+        let limits = (1..20).map(|part| data.full_scale_v * (1.0 - 0.04 * f64::from(part)));
+        let knee = (INITIAL_KNEE * data.full_scale_v.max(1.0)).ln();
+        let point = |limit: f64| if form == WITH_KNEE { vec![limit, knee] } else { vec![limit] };
+        limits.chain([0.985 * data.full_scale_v]).map(point).collect()
     }
 
-    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.limit_v = chain.limit_v.min(point[0]);
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let knee = (form == WITH_KNEE).then(|| Quantity::new("knee_v", Dimension::Voltage, point[1].exp()));
+        [Quantity::new("limit_v", Dimension::Voltage, point[0])].into_iter().chain(knee).collect()
+    }
+
+    /// A plant file holds a sharp limit.
+    fn unmodelled(&self, form: usize, point: &[f64], data: &Data, _: &Chain) -> Option<toml::Value> {
+        (form == WITH_KNEE).then(|| table(self, form, point, data))
+    }
+
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        // A plant file holds the limit without its knee.
+        if point[0] <= chain.limit_v {
+            (chain.limit_v, chain.knee_v) = (point[0], if form == WITH_KNEE { point[1].exp() } else { 0.0 });
+        }
     }
 }

@@ -1,15 +1,36 @@
-//! Readings saturate at a bound: `reading = min(y, limit)`, or `max` at a lower bound.
+//! Readings saturate at a bound.
+//!
+//! | form | |
+//! | --- | --- |
+//! | upper, lower | `reading = min(y, limit)`, `max(y, limit)` |
+//! | upper and lower with a knee | `reading = y - knee ln(1 + exp((y - limit) / knee))`, and its mirror image: a transition of about 4 knees |
 //!
 //! Where several readings are exactly the extreme, the bound is known and [`crate::record::observed`] treats those rows
 //! as censored. These forms are for a bound in front of the noise.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
+use crate::plant::knee::at_most;
 use crate::record::data::Data;
 
 pub(super) struct SensorSaturation;
 
 const UPPER: usize = 0;
+const UPPER_WITH_KNEE: usize = 2;
+/// Bounds of a knee, relative to the range of the readings, and those that are tried.
+const SMALLEST_KNEE: f64 = 0.003;
+const LARGEST_KNEE: f64 = 0.15;
+const KNEES: [f64; 2] = [0.015, 0.05];
+/// Largest distance of a bound with a knee beyond the farthest reading, relative to the range: readings only approach it.
+const BEYOND: f64 = 0.1;
+
+fn is_upper(form: usize) -> bool {
+    matches!(form, UPPER | UPPER_WITH_KNEE)
+}
+
+fn has_knee(form: usize) -> bool {
+    form >= UPPER_WITH_KNEE
+}
 
 impl Effect for SensorSaturation {
     fn cause(&self) -> &'static str {
@@ -33,26 +54,42 @@ impl Effect for SensorSaturation {
     }
 
     fn forms(&self) -> usize {
+        4
+    }
+
+    fn common_forms(&self) -> usize {
         2
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (lowest, highest) = extremes(data);
-        vec![Coordinate::new(lowest, highest)]
+        let range = (highest - lowest).max(f64::MIN_POSITIVE);
+        let beyond = if has_knee(form) { BEYOND * range } else { 0.0 };
+        let limit = if is_upper(form) {
+            Coordinate::new(lowest, highest + beyond)
+        } else {
+            Coordinate::new(lowest - beyond, highest)
+        };
+        let knee = Coordinate::log(SMALLEST_KNEE * range, LARGEST_KNEE * range);
+        if has_knee(form) { vec![limit, knee] } else { vec![limit] }
     }
 
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {
         let (lowest, highest) = extremes(data);
         [0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.45, 0.6]
-            .map(|part| {
+            .into_iter()
+            .flat_map(|part| {
                 let depth = part * (highest - lowest);
-                vec![if form == UPPER { highest - depth } else { lowest + depth }]
+                let limit = if is_upper(form) { highest - depth } else { lowest + depth };
+                let with = KNEES.map(|knee| vec![limit, (knee * (highest - lowest)).ln()]);
+                if has_knee(form) { with.to_vec() } else { vec![vec![limit]] }
             })
-            .to_vec()
+            .collect()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("limit", Dimension::Reading, point[0])]
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let knee = has_knee(form).then(|| Quantity::new("knee", Dimension::ReadingDifference, point[1].exp()));
+        [Quantity::new("limit", Dimension::Reading, point[0])].into_iter().chain(knee).collect()
     }
 
     fn ln_candidates(&self, _: usize, _: &Data) -> f64 {
@@ -60,8 +97,9 @@ impl Effect for SensorSaturation {
     }
 
     fn modify_readings(&self, form: usize, point: &[f64], _: &Data, readings: &mut [f64]) {
+        let (limit, knee) = (point[0], if has_knee(form) { point[1].exp() } else { 0.0 });
         for reading in readings {
-            *reading = if form == UPPER { reading.min(point[0]) } else { reading.max(point[0]) };
+            *reading = if is_upper(form) { at_most(*reading, limit, knee) } else { -at_most(-*reading, -limit, knee) };
         }
     }
 }

@@ -14,6 +14,7 @@
 //! replaced.
 
 use crate::plant::initial_state::InitialState;
+use crate::plant::knee::at_most;
 use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::load_friction::LoadFriction;
@@ -29,6 +30,8 @@ use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 pub struct Chain<'a> {
     /// Largest magnitude of the amplifier's voltage, in V.
     pub limit_v: f64,
+    /// Knee with which it is approached, in V; 0 for none. A plant file cannot hold it.
+    pub knee_v: f64,
     /// Largest rate at which the amplifier's voltage rises, in V/s.
     pub rising_v_per_s: f64,
     /// Largest rate at which it falls, in V/s, positive.
@@ -81,6 +84,7 @@ impl<'a> Chain<'a> {
         let slew_v_per_s = number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY);
         Self {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
+            knee_v: 0.0,
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
             power_v2_per_s: f64::INFINITY,
@@ -186,7 +190,7 @@ impl<'a> Chain<'a> {
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
     pub fn amplify(&self, signal: &mut Signal) {
         if self.limit_v.is_finite() {
-            signal.map(|voltage| voltage.clamp(-self.limit_v, self.limit_v));
+            signal.map(|voltage| at_most(voltage.abs(), self.limit_v, self.knee_v).copysign(voltage));
         }
         signal.before = self.initial_v.unwrap_or(signal.before);
         if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {

@@ -10,6 +10,7 @@
 pub mod base;
 pub mod chain;
 pub mod initial_state;
+pub mod knee;
 pub mod knots;
 pub mod law;
 pub mod leakage;
