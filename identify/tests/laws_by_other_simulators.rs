@@ -115,6 +115,27 @@ fn friction_under_load_is_hysteresis() {
     assert!((value(&report, "width_v") - (500.0 - 475.0 / 1.05)).abs() < 0.5, "{report:?}");
 }
 
+/// From rest 0.7 u + 0.3 u^2 / 500 V; after a reversal half of the curvature: 500 plays of thresholds 1 V apart.
+#[test]
+fn rayleighs_law_is_hysteresis_without_a_gain_error() {
+    for seed in [21, 22] {
+        let mut plays = [0.0f64; 500];
+        let settles = |voltage_v: f64| {
+            let steps = plays.iter_mut().enumerate().map(|(play, state)| {
+                let threshold = play as f64 + 0.5;
+                *state = state.clamp(voltage_v - threshold, voltage_v + threshold);
+                *state
+            });
+            0.7 * voltage_v + 2.0 * 0.3 / 500.0 * steps.sum::<f64>()
+        };
+        let record = settling(seed, settles, |_, _| TAU_S, |_, stiffness| stiffness);
+        let (cause, report) = first(&record);
+        assert_eq!((cause.as_str(), report.findings.len()), ("hysteresis", 1), "{report:?}");
+        assert!((value(&report, "slope") - 0.7).abs() < 0.03, "{report:?}");
+        assert!(report.extended.quality.held_out_rmse < 1.2, "{report:?}");
+    }
+}
+
 /// What is linear of it is a gain error. Whatever else is named, the record is then not explained.
 #[test]
 fn dead_band_is_a_static_nonlinearity() {

@@ -1,7 +1,7 @@
 //! Rate-independent hysteresis: the ascending and descending branches differ.
 //!
 //! A [`PlayBank`] of play operators, each with a threshold `r`: `f = (1 - sum weights) u + sum weight play`. The mean line of a
-//! large loop has the slope 1: what is linear belongs to `gain-error`.
+//! large loop has the slope 1: what is linear belongs to `gain-error`. Rayleigh's law has a slope of its own, that of a small loop.
 //!
 //! | form | plays | coordinates |
 //! | --- | --- | --- |
@@ -10,9 +10,12 @@
 //! | bank | five, at r / 5 to r | r, weights |
 //! | behind | one, weight 1, behind the relaxation: the sensor's backlash | r |
 //! | cycled part, cycled bank | the same, with the initial condition on the descending branch | the same |
+//! | Rayleigh, cycled Rayleigh | eight of equal weight, at all thresholds up to the full scale `U`: `slope u + part u^2 / U` from rest | slope, part |
 //! | load | none: a [`LoadFriction`], whose branches differ in proportion to the voltage | part |
 //!
 //! The initial condition belongs to the record, not to the spring.
+
+use model::extended::memory::MAX_PLAYS;
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity, table};
@@ -26,15 +29,39 @@ pub(super) struct Hysteresis;
 const WHOLE: usize = 0;
 const BEHIND: usize = 5;
 const LOAD: usize = 6;
+const RAYLEIGH: usize = 7;
+const CYCLED_RAYLEIGH: usize = 8;
 
 /// Number of plays, and initial condition on the descending branch, for each form.
-const FORMS: [(usize, bool); 7] = [(1, false), (1, false), (5, false), (1, true), (5, true), (1, false), (0, false)];
+const FORMS: [(usize, bool); 9] = [
+    (1, false),
+    (1, false),
+    (5, false),
+    (1, true),
+    (5, true),
+    (1, false),
+    (0, false),
+    (RAYLEIGH_PLAYS, false),
+    (RAYLEIGH_PLAYS, true),
+];
+/// Plays of Rayleigh's law, a Preisach model of even density: as many as a plant file holds.
+const RAYLEIGH_PLAYS: usize = MAX_PLAYS;
 /// Thresholds of a bank relative to `r`.
 const PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// Returns the bank of a form at a point.
-fn bank(form: usize, point: &[f64]) -> PlayBank {
+fn is_rayleigh(form: usize) -> bool {
+    matches!(form, RAYLEIGH | CYCLED_RAYLEIGH)
+}
+
+/// Returns the bank of a form at a point, for voltages up to `full_scale_v`.
+fn bank(form: usize, point: &[f64], full_scale_v: f64) -> PlayBank {
     let (count, cycled) = FORMS[form];
+    if is_rayleigh(form) {
+        let threshold = |play: usize| full_scale_v * (play as f64 + 0.5) / count as f64;
+        let weight = 2.0 * point[1] / count as f64;
+        let bank = PlayBank::new(point[0], (0..count).map(|play| (threshold(play), weight)));
+        return if cycled { bank.cycled() } else { bank };
+    }
     let threshold = point[0].exp();
     let plays: Vec<(f64, f64)> = match (form, count) {
         (WHOLE | BEHIND, _) => vec![(threshold, 1.0)],
@@ -79,6 +106,9 @@ impl Effect for Hysteresis {
         if form == LOAD {
             return vec![Coordinate::new(-0.5, 0.5)];
         }
+        if is_rayleigh(form) {
+            return vec![Coordinate::new(0.05, 5.0), Coordinate::new(0.0, 5.0)];
+        }
         let (count, _) = FORMS[form];
         let mut coordinates = vec![Coordinate::log(1e-4 * data.full_scale_v, 0.5 * data.full_scale_v)];
         if !matches!(form, WHOLE | BEHIND) {
@@ -96,6 +126,9 @@ impl Effect for Hysteresis {
         if form == LOAD {
             return vec![vec![-0.02], vec![0.02]];
         }
+        if is_rayleigh(form) {
+            return vec![vec![0.9, 0.1], vec![0.7, 0.3]];
+        }
         let (count, _) = FORMS[form];
         let start = |part: f64, weight: f64| {
             let mut point = vec![(part * data.full_scale_v).ln()];
@@ -111,9 +144,10 @@ impl Effect for Hysteresis {
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
         let width = match form {
             LOAD => LoadFriction::new(point[0]).width(data.full_scale_v),
-            _ => bank(form, point).width(data.full_scale_v),
+            _ => bank(form, point, data.full_scale_v).width(data.full_scale_v),
         };
-        vec![Quantity::new("width_v", Dimension::Voltage, width)]
+        let slope = is_rayleigh(form).then(|| Quantity::new("slope", Dimension::Ratio, point[0]));
+        [Quantity::new("width_v", Dimension::Voltage, width)].into_iter().chain(slope).collect()
     }
 
     /// A plant file holds a limited number of plays, before the relaxation.
@@ -121,15 +155,15 @@ impl Effect for Hysteresis {
         (matches!(form, BEHIND | LOAD) || !chain.memory.fits_plant_file()).then(|| table(self, form, point, data))
     }
 
-    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         if form == BEHIND {
-            chain.memory_behind = bank(form, point);
+            chain.memory_behind = bank(form, point, data.full_scale_v);
             return;
         }
         if form == LOAD {
             chain.friction = LoadFriction::new(point[0]);
             return;
         }
-        chain.memory = bank(form, point).composed_with(&chain.memory);
+        chain.memory = bank(form, point, data.full_scale_v).composed_with(&chain.memory);
     }
 }
