@@ -17,12 +17,12 @@ const FULL_SCALE_V: f64 = 500.0;
 const FREQ_HZ: f64 = 0.73;
 
 /// Diagnoses the paper's spring under steps of 6 s, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
-/// and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `added_v` what is added to the reading in a row at a response; all
-/// others in V.
+/// and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `read` the reading in a row from response and noise; all others in
+/// V.
 fn diagnosed(
     amplified_v: impl Fn(f64, f64) -> f64,
     tau_s: impl Fn(usize) -> f64,
-    added_v: impl Fn(usize, f64) -> f64,
+    mut read: impl FnMut(usize, f64, f64) -> f64,
 ) -> Report {
     let mut seed = 11u32;
     let mut random = || {
@@ -33,19 +33,17 @@ fn diagnosed(
     let share = 0.1 / 1.1;
     let (mut voltage_v, mut across_v, mut lag) = (0.0, 0.0, 0.0);
     let row = |row: usize| {
-        let before_v = across_v;
         if row % 60 == 20 {
             voltage_v = if row == 20 { FULL_SCALE_V } else { (FULL_SCALE_V * random()).round() };
         }
-        let jumped_v = amplified_v(voltage_v, before_v);
-        // Without a bound the first reading after a step has its feedthrough.
-        let response = share * if jumped_v == voltage_v { voltage_v } else { before_v } + (1.0 - share) * lag;
+        // The first reading after a step has its feedthrough.
+        let response = share * amplified_v(voltage_v, across_v) + (1.0 - share) * lag;
         for _ in 0..STEPS {
             across_v = amplified_v(voltage_v, across_v);
             lag += (across_v - lag) * SAMPLE_S / STEPS as f64 / tau_s(row);
         }
         let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
-        let measured = Some(response + added_v(row, response) + noise);
+        let measured = Some(read(row, response, noise));
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured }
     };
     let record = Record { name: "steps".into(), rows: (0..ROWS).map(row).collect() };
@@ -56,10 +54,19 @@ fn ideal(voltage_v: f64, _: f64) -> f64 {
     voltage_v
 }
 
+/// Diagnoses an ideal amplifier's spring with an error that is added to the readings.
+fn with_added(added_v: impl Fn(usize, f64) -> f64) -> Report {
+    diagnosed(ideal, |_| TAU_S, |row, response, noise| response + added_v(row, response) + noise)
+}
+
+fn plain(_: usize, response: f64, noise: f64) -> f64 {
+    response + noise
+}
+
 /// Diagnoses an ideal amplifier's spring with a sine of an amplitude that depends on row and response.
 fn with_hum(amplitude_v: impl Fn(usize, f64) -> f64) -> Report {
     let sine = |row: usize| (TAU * FREQ_HZ * SAMPLE_S * row as f64).sin();
-    diagnosed(ideal, |_| TAU_S, |row, response| amplitude_v(row, response) * sine(row))
+    with_added(|row, response| amplitude_v(row, response) * sine(row))
 }
 
 /// Checks that a cause is all that is found, and that what is left is the noise. Returns one of its parameters.
@@ -118,7 +125,7 @@ fn an_amplifier_of_constant_power_has_a_bounded_rate() {
         let square = before_v * before_v;
         (square + (voltage_v * voltage_v - square).clamp(-most, most)).sqrt()
     };
-    let report = diagnosed(charged, |_| TAU_S, |_, _| 0.0);
+    let report = diagnosed(charged, |_| TAU_S, plain);
     let slew = of_only_finding(&report, "amplifier-slew", "slew_v_per_s");
     let exact = POWER_V2_PER_S / (2.0 * FULL_SCALE_V);
     assert!(slew.low < exact && exact < slew.high && slew.high - slew.low < 0.05 * exact, "{exact}: {slew:?}");
@@ -132,7 +139,7 @@ fn holds(report: &Report, name: &str, exact: f64) {
 
 #[test]
 fn a_time_constant_that_steps_has_two_values_and_a_time() {
-    let report = diagnosed(ideal, |row| if row < 1117 { TAU_S } else { 9.0 }, |_, _| 0.0);
+    let report = diagnosed(ideal, |row| if row < 1117 { TAU_S } else { 9.0 }, plain);
     holds(&report, "tau_first_s", TAU_S);
     holds(&report, "tau_last_s", 9.0);
     holds(&report, "at_s", 111.7);
@@ -140,7 +147,96 @@ fn a_time_constant_that_steps_has_two_values_and_a_time() {
 
 #[test]
 fn a_time_constant_that_drifts_has_a_first_and_a_last_value() {
-    let report = diagnosed(ideal, |row| TAU_S * (4.0f64 / TAU_S).powf(row as f64 / ROWS as f64), |_, _| 0.0);
+    let report = diagnosed(ideal, |row| TAU_S * (4.0f64 / TAU_S).powf(row as f64 / ROWS as f64), plain);
     holds(&report, "tau_first_s", TAU_S);
     holds(&report, "tau_last_s", 4.0);
+}
+
+fn contains(report: &Report, cause: &str, name: &str, exact: f64, widest: f64) {
+    let parameter = of_only_finding(report, cause, name);
+    assert!(parameter.low <= exact && exact <= parameter.high, "{name}: {exact}, {parameter:?}");
+    assert!(parameter.high - parameter.low < widest, "{name}: {parameter:?}");
+}
+
+#[test]
+fn a_shift_that_decays_has_a_beginning_and_a_time() {
+    let report = with_added(|row, _| if row < 713 { 0.0 } else { 18.0 * (-((row - 713) as f64) / 150.0).exp() });
+    contains(&report, "reading-offset", "offset", 18.0, 2.0);
+    contains(&report, "reading-offset", "decay_s", 15.0, 2.0);
+    contains(&report, "reading-offset", "from_s", 71.3, 1.0);
+}
+
+/// With ramps of 8 and 12 s at its ends.
+#[test]
+fn a_shift_that_comes_and_goes_by_ramps_has_its_level_between_them() {
+    let rises = |row: usize| (row as f64 - 700.0) / 80.0;
+    let falls = |row: usize| (1130.0 - row as f64) / 120.0;
+    let report = with_added(|row, _| -14.0 * rises(row).min(falls(row)).clamp(0.0, 1.0));
+    let value = |name| of_only_finding(&report, "reading-offset", name).value;
+    assert!((value("offset") + 14.0).abs() < 0.5, "{report:#?}");
+    assert!((value("rise_s") - 8.0).abs() < 2.0 && (value("fall_s") - 12.0).abs() < 2.0, "{report:#?}");
+    assert!((value("from_s") - 70.0).abs() < 3.0 && (value("to_s") - 113.0).abs() < 3.0, "{report:#?}");
+}
+
+/// A bound of a value that is approached as a power of 12.
+fn soft(value: f64, limit: f64) -> f64 {
+    value / (1.0 + (value.abs() / limit).powi(12)).powf(1.0 / 12.0)
+}
+
+#[test]
+fn a_bound_of_the_sensor_that_is_approached_gradually_has_a_knee() {
+    let report = diagnosed(ideal, |_| TAU_S, |_, response, noise| soft(response, 230.0) + noise);
+    let found = &report.findings[0];
+    let value = |name| found.parameters.iter().find(|(of, _)| of == name).map(|(_, parameter)| parameter.value);
+    assert!(found.cause == "sensor-saturation" && found.probability > 0.5, "{report:#?}");
+    assert!((value("limit").unwrap() - 230.0).abs() < 5.0, "{report:#?}");
+    assert!((8.0..30.0).contains(&value("knee").unwrap()), "{report:#?}");
+}
+
+#[test]
+fn a_limit_of_the_amplifier_that_is_approached_gradually_has_a_knee() {
+    let report = diagnosed(|voltage_v, _| soft(voltage_v, 330.0), |_| TAU_S, plain);
+    let value = |name| of_only_finding(&report, "amplifier-limit", name).value;
+    assert!((value("limit_v") - 330.0).abs() < 5.0 && (10.0..40.0).contains(&value("knee_v")), "{report:#?}");
+}
+
+/// Checks that the converter is all that is wrong, and returns its step.
+fn step_of_converter(report: &Report) -> f64 {
+    let causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert_eq!((report.verdict, causes), (Verdict::Explained, vec!["quantisation"]), "{report:#?}");
+    report.findings[0].parameters.iter().find(|(name, _)| name == "step").unwrap().1.value
+}
+
+#[test]
+fn missing_codes_of_a_converter_are_no_law_of_the_spring() {
+    const STEP_V: f64 = 9.0;
+    for (every, read_as) in [(4, -1), (5, 1)] {
+        let report = diagnosed(
+            ideal,
+            |_| TAU_S,
+            |_, response, noise| {
+                let code = ((response + noise) / STEP_V).round() as i64;
+                STEP_V * (if code.rem_euclid(every) == 2 { code + read_as } else { code }) as f64
+            },
+        );
+        assert!((step_of_converter(&report) - STEP_V).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_sensor_that_reports_changes_is_no_delay_and_no_law_of_the_spring() {
+    const LEAST_V: f64 = 12.0;
+    let mut last = f64::INFINITY;
+    let report = diagnosed(
+        ideal,
+        |_| TAU_S,
+        |_, response, noise| {
+            let new = response + noise;
+            if (new - last).abs() >= LEAST_V {
+                last = new;
+            }
+            last
+        },
+    );
+    assert!((LEAST_V..1.1 * LEAST_V).contains(&step_of_converter(&report)));
 }

@@ -4,6 +4,7 @@
 //! | --- | --- | --- | --- |
 //! | `as_rounded` | which causes, if readings were rounded to their grid? | always | unless a later pass replaces it |
 //! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
+//! | `with_missing_codes` | which, if a missing code is read as one of its neighbours? | if codes are missing | if that code is always the same one |
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
 //! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
@@ -27,7 +28,7 @@ use crate::fit::engine::Engine;
 use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
 use crate::record::data::Data;
-use crate::record::held::without_held;
+use crate::record::held::held;
 use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
@@ -54,15 +55,17 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
-    let held = without_held(record);
-    let record = held.as_ref().map_or(record, |(_, without)| without);
-    let records = std::slice::from_ref(record);
+    let held = held(record);
+    let shorter = held.as_ref().map(|held| held.left_out(record));
+    let new = std::slice::from_ref(shorter.as_ref().unwrap_or(record));
+    let reports = held.as_ref().is_some_and(|held| held.reported_change().is_some());
+    let records = if reports { std::slice::from_ref(record) } else { new };
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
-    let linear = linear(records, options);
+    let linear = linear(new, options);
     compare(&mut found, linear.as_ref());
     credibility::unlikely_to_suspects(&mut found.report);
-    hypothesise(&mut found, record, options, linear.as_ref());
-    if let Some((held, _)) = &held {
+    hypothesise(&mut found, &records[0], options, linear.as_ref());
+    if let Some(held) = &held {
         add_held(&mut found.report, held, &options.units);
     }
     Ok(found)
@@ -229,6 +232,7 @@ type Progress<'p> = &'p mut dyn FnMut(&Scored);
 fn of_readings(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
     let found = as_rounded(record, base, progress);
     let found = as_cut_off(record, base, found, progress);
+    let found = with_missing_codes(record, base, found, progress);
     as_unbounded(record, base, found, progress)
 }
 
@@ -259,7 +263,27 @@ fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnos
     likelihood(cut) > likelihood(&found.observed)
 }
 
-/// Third pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
+/// Third pass: searches with the missing codes of a converter read as their lower or their upper neighbours, if the causes that were found
+/// fit one of these as well as any: a reading that may be either says less, and on one side of a code only.
+fn with_missing_codes(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
+    let model = &found.extended.model;
+    let likelihood = |observed: &Observed| {
+        let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
+        engine.fit_twice(model.clone()).log_likelihood
+    };
+    let sides = [true, false].into_iter().filter(|_| !record.budget.is_over());
+    let sides = sides.filter_map(|below| found.observed.reading_missing_codes_as(below));
+    let best = sides.map(|side| (likelihood(&side), side)).max_by(|a, b| a.0.total_cmp(&b.0));
+    // Where either neighbour may be read, each has half of the probability.
+    let either = found.extended.log_likelihood
+        - std::f64::consts::LN_2 * found.observed.count_missing(&found.extended.residual) as f64;
+    match best.filter(|(likelihood, _)| *likelihood > either) {
+        Some((_, side)) => search(record, base, &side, found.warm_start, progress),
+        None => found,
+    }
+}
+
+/// Fourth pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
 fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
     if record.budget.is_over() || found.confirms_bounds() {
         return found;
@@ -267,7 +291,7 @@ fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress
     search(record, base, &found.observed.without_bounds(), found.warm_start, progress)
 }
 
-/// Fourth pass: removes parts of the plant file that the record does not support, then repeats the passes over the readings.
+/// Fifth pass: removes parts of the plant file that the record does not support, then repeats the passes over the readings.
 ///
 /// Causes are added to a simulation. A part that the spring lacks would need the opposite of a cause, which does not exist for
 /// hysteresis; combinations of other causes stand in for it. So each optional part is removed in turn, and stays removed if

@@ -88,6 +88,7 @@ mod tests {
             lower: None,
             scatter_v: 1.0,
             truncation_v: 0.0,
+            missing_codes: 0,
             sign: 1.0,
             weights: None,
         }

@@ -105,8 +105,8 @@ impl Noise {
         self.of_interval(kind, residual).map_or_else(|| self.exact_log_density(innovation), |(log, _)| log)
     }
 
-    /// Returns log-probability and term of a reading that is known up to an interval: it stopped at a bound, or was rounded to a
-    /// coarse step. Returns `None` for any other.
+    /// Returns log-probability and term of a reading that is known up to an interval: it stopped at a bound, was rounded to a
+    /// coarse step, or has a code next to missing ones. Returns `None` for any other.
     fn of_interval(&self, kind: Kind, residual: f64) -> Option<(f64, Term)> {
         match kind {
             // Rounded readings reach a bound half a step before it.
@@ -115,6 +115,7 @@ impl Noise {
                 let (log, term) = stopped(-residual - self.half_step, self.marginal);
                 Some((log, Term { residual: -term.residual, ..term }))
             }
+            Kind::Within(low, high) => Some(in_cell(residual + 0.5 * (low + high), self.marginal, 0.5 * (high - low))),
             Kind::Exact if self.half_step > 0.0 => Some(in_cell(residual, self.sigma, self.half_step)),
             Kind::Exact => None,
         }

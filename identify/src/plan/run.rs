@@ -127,6 +127,7 @@ fn refit(design: &Design, commands: &Commands, evaluation: &mut Evaluation) {
         lower: None,
         scatter_v: design.noise.sigma,
         truncation_v: 0.0,
+        missing_codes: 0,
         sign: 1.0,
         weights: Some(grid.weights.iter().map(|weight| weight.sqrt() / likelier.exp()).collect()),
     };

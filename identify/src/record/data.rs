@@ -8,6 +8,7 @@ use simulation::schedule::{Between, Schedule};
 
 use crate::record::decay::relaxes_from_earlier_input;
 use crate::record::folds::folds;
+use crate::record::held::held;
 use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::scales::Scales;
@@ -24,6 +25,9 @@ const THINNED_CHORD_ERROR: f64 = 1e-3;
 pub struct Data {
     /// Time of each reading, in s, increasing.
     pub time_s: Vec<f64>,
+    /// Largest distance of the true value with noise from each row's reading, in V: more than 0 where a sensor that reports changes did
+    /// not report one. `None` for any other sensor.
+    pub unreported_v: Option<Vec<f64>>,
     /// Commanded voltage at each reading, in V.
     pub voltage_v: Vec<f64>,
     /// Readings, in V of equivalent static voltage.
@@ -86,6 +90,7 @@ impl Data {
         let time_s: Vec<f64> = rows().map(|(row, _)| row.time_s).collect();
         let voltage_v: Vec<f64> = rows().map(|(row, _)| row.voltage_v).collect();
         let reading: Vec<f64> = rows().map(|(_, reading)| reading).collect();
+        let unreported_v = unreported(record).map(|all| all.into_iter().step_by(every).collect());
         let first_v = voltage_v.first().copied().unwrap_or(0.0);
         let offset = normalisation.start.map_or(0.0, |start| start.offset);
         // Decided from all rows, so that a subset gets the same coordinates.
@@ -117,6 +122,7 @@ impl Data {
         let folds = fold.iter().max().map_or(1, |&last| usize::from(last) + 1);
         Self {
             time_s,
+            unreported_v,
             voltage_v,
             reading,
             command,
@@ -154,6 +160,7 @@ impl Data {
         let largest_v = records.iter().fold(0.0, |most: f64, data| most.max(data.largest_v));
         let mut all = Data {
             time_s: Vec::new(),
+            unreported_v: None,
             voltage_v: Vec::new(),
             reading: Vec::new(),
             command: records[0].command.clone(),
@@ -226,6 +233,14 @@ impl Data {
         }
         self.time_s.last().unwrap_or(&0.0) - self.time_s.first().unwrap_or(&0.0)
     }
+}
+
+/// Returns the changes that were not reported, of all rows with a reading.
+fn unreported(record: &Record) -> Option<Vec<f64>> {
+    let held = held(record)?;
+    let change = held.reported_change()?;
+    let rows = (0..record.rows.len()).filter(|&row| record.rows[row].measured.is_some());
+    Some(rows.map(|row| if held.rows.binary_search(&row).is_ok() { change } else { 0.0 }).collect())
 }
 
 /// Smallest magnitude of the voltage, relative to the largest, of a record that is never near 0 V.

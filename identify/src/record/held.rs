@@ -2,15 +2,17 @@
 //! changes only.
 //!
 //! Continuous noise does not give the same number twice, and readings on a coarse grid return to the number before last. Readings
-//! that repeat but do not return were held. They say nothing new, so that a record is diagnosed without them.
+//! that repeat but do not return were held. They say nothing new, so that a record is diagnosed without them; only if a sensor reports
+//! changes, a reading that it did not report says that the response was near the last one.
 //!
 //! What holds them shows in the number of rows from one new reading to the next: readings that are lost at random leave numbers that
-//! are independent of each other, a sensor that reports changes leaves few rows while the response changes and many while it rests.
+//! are independent of each other, a sensor that reports changes leaves few rows while the response changes and many while it rests. Such
+//! a sensor also reports changes of nearly one size after very different times.
 
 use simulation::record::Record;
 
 use crate::record::quantisation_grid::QuantisationGrid;
-use crate::stats::median::median;
+use crate::stats::median::{median, robust_deviation};
 use crate::stats::thresholds::empirical::{COARSEST_GRID_OF_HELD, FEWEST_TIES, LEAST_HELD, MOST_RETURNS};
 use crate::stats::thresholds::probability::Z_RARE;
 
@@ -22,6 +24,8 @@ const THRESHOLD: f64 = 0.3;
 const TURNING: f64 = 0.2;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
 const CLOCK: f64 = 0.3;
+/// Largest scatter of the sizes of changes, relative to that of their rates, where changes of one size are reported.
+const SAME_SIZE: f64 = 0.5;
 /// Largest part of the held readings in one run: beyond, the sensor was stuck for a while.
 const LARGEST_RUN: f64 = 0.25;
 /// Fewest new readings.
@@ -41,12 +45,12 @@ pub enum Reason {
 }
 
 /// What the held readings of a record show.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Held {
     /// Why they were held.
     pub reason: Reason,
-    /// Number of them.
-    pub count: usize,
+    /// Their rows in the record.
+    pub rows: Vec<usize>,
     /// Their fraction of all readings.
     pub fraction: f64,
     /// Smallest and median change between new readings, in the reading's unit.
@@ -57,8 +61,22 @@ pub struct Held {
     pub error: f64,
 }
 
-/// Returns what the held readings of a record show, and the record without them; `None` if it has none.
-pub fn without_held(record: &Record) -> Option<(Held, Record)> {
+impl Held {
+    /// Returns a record without its held readings.
+    pub fn left_out(&self, record: &Record) -> Record {
+        let mut shorter = record.clone();
+        self.rows.iter().for_each(|&row| shorter.rows[row].measured = None);
+        shorter
+    }
+
+    /// Returns the change from the last reading beyond which a sensor reports a new one, in the reading's unit; `None` if it reports all.
+    pub fn reported_change(&self) -> Option<f64> {
+        (self.reason == Reason::ReportsChanges).then_some(self.changes[0])
+    }
+}
+
+/// Returns what the held readings of a record show; `None` if it has none.
+pub fn held(record: &Record) -> Option<Held> {
     let rows: Vec<(usize, f64, f64)> =
         record.rows.iter().enumerate().filter_map(|(row, of)| Some((row, of.time_s, of.measured?))).collect();
     let reading = |row: usize| rows[row].2;
@@ -86,7 +104,7 @@ pub fn without_held(record: &Record) -> Option<(Held, Record)> {
         return None;
     }
     let changes = changes(&values);
-    let reason = reason(&lengths);
+    let reason = reason(&rows, &new, &changes);
     let (mut ages, mut squares) = (Vec::new(), 0.0);
     for pair in new.windows(2) {
         let [(_, from_s, from), (_, to_s, to)] = [rows[pair[0]], rows[pair[1]]];
@@ -99,18 +117,15 @@ pub fn without_held(record: &Record) -> Option<(Held, Record)> {
     let rows_aged = ages.len() as f64;
     let mean_s = ages.iter().sum::<f64>() / rows_aged;
     let spread_s = (ages.iter().map(|age| (age - mean_s).powi(2)).sum::<f64>() / rows_aged).sqrt();
-    let mut shorter = record.clone();
     let held = (0..rows.len()).filter(|row| new.binary_search(row).is_err());
-    held.for_each(|row| shorter.rows[rows[row].0].measured = None);
-    let held = Held {
+    Some(Held {
         reason,
-        count,
+        rows: held.map(|row| rows[row].0).collect(),
         fraction,
         changes: [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]],
         age_s: [mean_s, spread_s / (new.len() as f64).sqrt()],
         error: (squares / rows_aged).sqrt(),
-    };
-    Some((held, shorter))
+    })
 }
 
 /// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between.
@@ -137,9 +152,23 @@ fn changes(new: &[f64]) -> Vec<f64> {
     changes
 }
 
-/// Returns why readings were held for numbers of rows: if these are correlated with the next ones beyond chance, because they depend on
-/// the response. They are clipped, so that a few long rests do not hide that.
-fn reason(lengths: &[f64]) -> Reason {
+/// Returns why readings were held, from all of them as row, time and value, the rows of the new ones, and the sizes of their changes.
+///
+/// The numbers of rows from one new reading to the next depend on the response if they are correlated with the next ones beyond chance;
+/// they are clipped, so that a few long rests do not hide that. They also do if all changes are nearly of one size, while their rates
+/// are not.
+fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason {
+    let lengths: Vec<f64> = new.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    let steps = new.windows(2).map(|pair| (rows[pair[0]], rows[pair[1]])).filter(|(from, to)| from.2 != to.2);
+    let (sizes, rates): (Vec<f64>, Vec<f64>) = steps
+        .map(|((_, from_s, from), (_, to_s, to))| ((to - from).abs().ln(), ((to - from).abs() / (to_s - from_s)).ln()))
+        .unzip();
+    let spread = |of: &[f64]| {
+        let middle = median(&mut of.to_vec()).unwrap_or(0.0);
+        robust_deviation(of.iter().map(|value| value - middle)).unwrap_or(0.0)
+    };
+    let least = changes[(SMALLEST * changes.len() as f64) as usize];
+    let of_one_size = least > THRESHOLD * changes[changes.len() / 2] && spread(&sizes) < SAME_SIZE * spread(&rates);
     let most = 4.0 * median(&mut lengths.to_vec()).unwrap_or(1.0);
     let clipped: Vec<f64> = lengths.iter().map(|length| length.min(most)).collect();
     let mean = clipped.iter().sum::<f64>() / clipped.len() as f64;
@@ -148,7 +177,7 @@ fn reason(lengths: &[f64]) -> Reason {
     let rows = clipped.len() as f64;
     if variance < (CLOCK * mean).powi(2) * rows {
         Reason::SlowClock
-    } else if product / variance * rows.sqrt() > Z_RARE {
+    } else if of_one_size || product / variance * rows.sqrt() > Z_RARE {
         Reason::ReportsChanges
     } else {
         Reason::Lost
@@ -179,25 +208,37 @@ mod tests {
 
     #[test]
     fn lost_readings_and_reports_of_changes_are_held() {
-        let (lost, shorter) =
-            without_held(&record(|before, new, random| if random < 0.4 { before } else { new })).unwrap();
+        let all = record(|before, new, random| if random < 0.4 { before } else { new });
+        let lost = held(&all).unwrap();
         assert!(lost.reason == Reason::Lost && (lost.fraction - 0.4).abs() < 0.05, "{lost:?}");
         // A reading that is lost with probability p is p / (1 - p) rows old.
         assert!((lost.age_s[0] - 0.1 * 0.4 / 0.6).abs() < 4.0 * lost.age_s[1], "{lost:?}");
-        assert_eq!(shorter.rows.iter().filter(|row| row.measured.is_some()).count(), ROWS - lost.count);
+        let left = lost.left_out(&all).rows.iter().filter(|row| row.measured.is_some()).count();
+        assert_eq!(left, ROWS - lost.rows.len());
         let sent = record(|before, new, _| if (new - before).abs() < 6.0 { before } else { new });
-        let (sent, _) = without_held(&sent).unwrap();
+        let sent = held(&sent).unwrap();
         assert!(sent.reason == Reason::ReportsChanges && sent.changes[0] >= 6.0, "{sent:?}");
         let mut slow = record(|_, new, _| new);
         (0..ROWS).filter(|row| row % 3 > 0).for_each(|row| slow.rows[row].measured = slow.rows[row - 1].measured);
-        assert_eq!(without_held(&slow).unwrap().0.reason, Reason::SlowClock);
+        assert_eq!(held(&slow).unwrap().reason, Reason::SlowClock);
+    }
+
+    /// The noise decides when the response reports a change, so that the numbers of rows are independent.
+    #[test]
+    fn changes_of_one_size_after_any_time_are_reports() {
+        for least in [8.0, 15.0, 20.0] {
+            let all = record(|before, new, _| if (new - before).abs() < least { before } else { new });
+            let sent = held(&all).unwrap();
+            let change = sent.reported_change().unwrap();
+            assert!((least..1.2 * least).contains(&change), "{sent:?}");
+        }
     }
 
     #[test]
     fn a_sensor_that_sticks_for_a_while_is_not_left_out() {
         let mut stuck = record(|_, new, _| new);
         (701..1200).for_each(|row| stuck.rows[row].measured = stuck.rows[700].measured);
-        assert_eq!(without_held(&stuck), None);
+        assert_eq!(held(&stuck), None);
     }
 
     #[test]
@@ -210,7 +251,7 @@ mod tests {
             row.measured = Some((1e3f64 * state).round() / 1e3);
         }
         for record in [grid(0.01), grid(1.0), grid(4.0), grid(12.0), bound, smooth, record(|_, new, _| new)] {
-            assert!(without_held(&record).is_none());
+            assert!(held(&record).is_none());
         }
     }
 }

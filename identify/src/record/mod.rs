@@ -18,6 +18,7 @@ pub(crate) mod folds;
 pub mod held;
 pub mod heteroscedasticity;
 pub mod input;
+mod missing_codes;
 pub mod normalisation;
 pub mod observed;
 pub mod quantisation_grid;

@@ -10,15 +10,18 @@ use crate::dimension::Dimension;
 use crate::record::bounds::{Bounds, Distinct, scatter};
 use crate::record::data::Data;
 use crate::record::heteroscedasticity;
+use crate::record::missing_codes;
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::record::scales::Scales;
 use crate::stats::thresholds::empirical::{COARSE, FINEST_V, LEAST_TRUNCATION};
 
 /// What one reading says about the true value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// The reading is the true value with noise.
     Exact,
+    /// The true value with noise less the reading is between two values, in V (interval-censored).
+    Within(f64, f64),
     /// The reading stopped at the upper bound; the true value is at least that (right-censored).
     AtLeast,
     /// The reading stopped at the lower bound; the true value is at most that (left-censored).
@@ -41,6 +44,8 @@ pub struct Observed {
     /// Mean error of truncation, in V: half a step if the converter truncates, 0 if it rounds; negative for readings that fall
     /// as the stiffness rises.
     pub truncation_v: f64,
+    /// Number of codes that the converter never gives.
+    pub missing_codes: usize,
     /// Sign of the reading's change with the stiffness, 1 or -1.
     pub sign: f64,
     /// The reciprocal scale of each row's noise, with a geometric mean of 1; `None` if the scale is constant.
@@ -53,25 +58,34 @@ impl Observed {
         if data.is_joined() {
             return Self::joined(&data.parts.iter().map(|part| Self::new(&part.data)).collect::<Vec<_>>());
         }
-        let distinct = Distinct::of(&data.reading);
+        let unreported = |row: usize| data.unreported_v.as_ref().map_or(0.0, |changes| changes[row]);
+        let reported = (0..data.rows()).filter(|&row| unreported(row) == 0.0).map(|row| data.reading[row]);
+        let reading: Vec<f64> = reported.collect();
+        let distinct = Distinct::of(&reading);
         let grid = distinct.between_extremes().and_then(|values| printed_grid(&values, data.scales()));
-        let scatter_v = scatter(&data.reading).max(FINEST_V.get());
-        let Bounds { upper, lower } = Bounds::of(&data.reading, &distinct, grid.map(|grid| grid.step), scatter_v);
-        let kinds: Vec<Kind> = data
-            .reading
-            .iter()
-            .map(|&reading| {
-                if upper.is_some_and(|bound| reading >= bound) {
-                    Kind::AtLeast
-                } else if lower.is_some_and(|bound| reading <= bound) {
-                    Kind::AtMost
-                } else {
-                    Kind::Exact
-                }
-            })
-            .collect();
+        let scatter_v = scatter(&reading).max(FINEST_V.get());
+        let Bounds { upper, lower } = Bounds::of(&reading, &distinct, grid.map(|grid| grid.step), scatter_v);
+        let coarse = grid.map(|grid| grid.step).filter(|step| *step >= COARSE.get() * scatter_v);
+        let cells = coarse.and_then(|step| missing_codes::cells(&data.reading, &data.voltage_v, step));
+        let kind = |(row, &reading): (usize, &f64)| {
+            if upper.is_some_and(|bound| reading >= bound) {
+                return Kind::AtLeast;
+            }
+            if lower.is_some_and(|bound| reading <= bound) {
+                return Kind::AtMost;
+            }
+            let change = unreported(row);
+            if change > 0.0 {
+                return Kind::Within(-change, change);
+            }
+            let wider = cells.as_ref().and_then(|cells| cells.wider[row]);
+            wider.map_or(Kind::Exact, |(low, high)| Kind::Within(low, high))
+        };
+        let kinds: Vec<Kind> = data.reading.iter().enumerate().map(kind).collect();
+        let missing_codes = cells.as_ref().map_or(0, |cells| cells.missing);
         let sign = data.scales().reading.signum();
-        let mut observed = Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, sign, weights: None };
+        let mut observed =
+            Self { kinds, grid, upper, lower, scatter_v, truncation_v: 0.0, missing_codes, sign, weights: None };
         // Rounding makes the scale constant.
         if observed.step_beyond(COARSE.get()).is_none() {
             observed.weights = heteroscedasticity::weights(data, |row| observed.is_exact(row));
@@ -103,6 +117,7 @@ impl Observed {
             lower: common(|record| record.lower),
             scatter_v,
             truncation_v: 0.0,
+            missing_codes: records.iter().map(|record| record.missing_codes).max().unwrap_or(0),
             sign: records[0].sign,
             weights: weights.iter().any(|weight| (weight - 1.0).abs() > 1e-9).then_some(weights),
         }
@@ -110,7 +125,11 @@ impl Observed {
 
     /// Returns the same without bounds; a spring that settles at its highest voltage also repeats one reading.
     pub fn without_bounds(&self) -> Self {
-        Self { kinds: vec![Kind::Exact; self.kinds.len()], upper: None, lower: None, ..self.clone() }
+        let unbounded = |kind: &Kind| match kind {
+            Kind::AtLeast | Kind::AtMost => Kind::Exact,
+            kind => *kind,
+        };
+        Self { kinds: self.kinds.iter().map(unbounded).collect(), upper: None, lower: None, ..self.clone() }
     }
 
     /// Returns the properties of a subset of the rows, with bounds and truncation as concluded from all rows.
@@ -130,21 +149,41 @@ impl Observed {
         Some(Self { truncation_v: self.sign * step / 2.0, ..self.clone() })
     }
 
+    /// Returns the same for a converter that reads a missing code as the one below it, or as the one above it; `None` if no code is
+    /// missing.
+    pub fn reading_missing_codes_as(&self, below: bool) -> Option<Self> {
+        let half = 0.5 * self.grid.filter(|_| self.missing_codes > 0)?.step;
+        let narrower = |kind: &Kind| match *kind {
+            Kind::Within(low, high) if below => Kind::Within(low.max(-half), high),
+            Kind::Within(low, high) => Kind::Within(low, high.min(half)),
+            kind => kind,
+        };
+        Some(Self { kinds: self.kinds.iter().map(narrower).collect(), ..self.clone() })
+    }
+
+    /// Returns the number of rows whose true value is that of a missing code, given their residuals, in V.
+    pub fn count_missing(&self, residual: &[f64]) -> usize {
+        let half = self.grid.map_or(0.0, |grid| 0.5 * grid.step);
+        let rows = residual.iter().zip(&self.kinds);
+        rows.filter(|(left, kind)| matches!(kind, Kind::Within(..)) && left.abs() > half).count()
+    }
+
     /// Returns the smallest error of each row that explains its reading, in V: 0 for a reading at a bound when the
-    /// prediction is beyond it.
+    /// prediction is beyond it, and for one that is known up to an interval when the prediction is in it.
     pub fn errors<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
         if self.all_exact() {
             return Cow::Borrowed(residual);
         }
         let error = |(&r, kind): (&f64, &Kind)| match kind {
             Kind::Exact => r,
+            Kind::Within(low, high) => (r + low).max(0.0) + (r + high).min(0.0),
             Kind::AtLeast => r.max(0.0),
             Kind::AtMost => r.min(0.0),
         };
         residual.iter().zip(&self.kinds).map(error).collect()
     }
 
-    /// Returns the values of the rows that did not stop at a bound.
+    /// Returns the values of the rows whose readings are known but for noise and rounding.
     pub fn uncensored<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
         if self.all_exact() {
             return Cow::Borrowed(values);
@@ -157,7 +196,7 @@ impl Observed {
         self.kinds[row] == Kind::Exact
     }
 
-    /// Returns true if no reading stopped at a bound.
+    /// Returns true if no reading stopped at a bound or is known up to an interval only.
     pub fn all_exact(&self) -> bool {
         self.kinds.iter().all(|kind| *kind == Kind::Exact)
     }

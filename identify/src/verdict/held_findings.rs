@@ -10,7 +10,9 @@ use crate::verdict::finding::explained;
 
 /// Adds the finding to a report, in the file's units, on the same record without the held readings.
 pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
-    report.rows += held.count;
+    if held.reported_change().is_none() {
+        report.rows += held.rows.len();
+    }
     let parameter = |value, low, high, dimension: Dimension| Parameter {
         value,
         low,
@@ -27,12 +29,22 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
         Reason::ReportsChanges => {
             let [smallest, middle] = held.changes;
             let step = parameter(smallest, 0.0, middle, Dimension::ReadingSize);
-            ("quantisation", "step", step, "they change seldom while the response rests: only changes are reported")
+            (
+                "quantisation",
+                "step",
+                step,
+                "they change by as much however long that takes: only changes are reported; in between, the response is near the last reading",
+            )
         }
         Reason::Lost => {
             let [age_s, error_s] = held.age_s;
             let late = parameter(age_s, age_s - Z * error_s, age_s + Z * error_s, Dimension::Time);
-            ("delay", "delay_s", late, "independently of the response: new readings are late or lost")
+            (
+                "delay",
+                "delay_s",
+                late,
+                "independently of the response: new readings are late or lost; the other readings alone are diagnosed",
+            )
         }
     };
     if report.findings.iter().any(|finding| finding.cause == cause) {
@@ -45,7 +57,7 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
         parameters: vec![(name.to_owned(), value)],
         rmse_before: after.hypot(held.error),
         rmse_after: after,
-        evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}; the other readings alone are diagnosed"),
+        evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}"),
         proved: true,
     });
     report.findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));

@@ -41,10 +41,15 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
             .zip(&predicted)
             .map(|(reading, predicted)| reading - (((predicted - grid) / step).round() * step + grid))
             .collect();
+        let mut parameters = single("step", step, low, high, Dimension::ReadingSize);
+        if observed.missing_codes > 0 {
+            let missing = observed.missing_codes as f64;
+            parameters.extend(single("missing_codes", missing, missing, missing, Dimension::Ratio));
+        }
         findings.push(Finding {
             cause: "quantisation",
             probability: 1.0,
-            parameters: single("step", step, low, high, Dimension::ReadingSize),
+            parameters,
             rmse_before: root_mean_square(
                 &fit.residual.iter().map(|left| left - observed.truncation_v).collect::<Vec<_>>(),
             ),
