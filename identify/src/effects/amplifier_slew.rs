@@ -5,8 +5,9 @@
 //! | both ways | `-slew <= du/dt <= slew` |
 //! | two rates | `-falling <= du/dt <= slew` |
 //! | power | `-2 slew <= d(u |u| / full scale)/dt <= 2 slew`: a charger of constant power, slower at a high voltage |
+//! | with a time constant | `du/dt = (command - u) / tau` within `-slew` to `slew`: an operational amplifier |
 //!
-//! The exponential approach of an output resistance is a `series-lag`. If the record may not begin at rest, the voltage of a
+//! The exponential approach of an output resistance alone is a `series-lag`. If the record may not begin at rest, the voltage of a
 //! rate-limited amplifier before the first row is a further coordinate.
 
 use crate::dimension::Dimension;
@@ -19,8 +20,13 @@ pub(super) struct AmplifierSlew;
 const BOTH_WAYS: usize = 0;
 const TWO_RATES: usize = 1;
 const POWER: usize = 2;
-/// Number of rates of a form.
-const RATES: [usize; 3] = [1, 2, 1];
+const WITH_TIME_CONSTANT: usize = 3;
+/// Number of coordinates of a form without the initial voltage.
+const COORDINATES: [usize; 4] = [1, 2, 1, 2];
+/// Bounds of the time constant, in rows and in durations of the record, and initial ones, in rows.
+const SHORTEST: f64 = 0.1;
+const LONGEST: f64 = 0.1;
+const INITIAL_ROWS: [f64; 2] = [2.0, 8.0];
 /// Ratio of the two rates at initial points.
 const INITIAL_RATIO: f64 = 3.0;
 /// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
@@ -53,7 +59,7 @@ impl Effect for AmplifierSlew {
     }
 
     fn forms(&self) -> usize {
-        3
+        4
     }
 
     fn common_forms(&self) -> usize {
@@ -62,7 +68,11 @@ impl Effect for AmplifierSlew {
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let (slowest, fastest) = range(data);
-        let mut coordinates = vec![Coordinate::log(slowest, fastest); RATES[form]];
+        let mut coordinates = vec![Coordinate::log(slowest, fastest); COORDINATES[form]];
+        if form == WITH_TIME_CONSTANT {
+            let shortest_s = SHORTEST * data.sample_s;
+            coordinates[1] = Coordinate::log(shortest_s, (LONGEST * data.duration_s()).max(2.0 * shortest_s));
+        }
         coordinates.extend(data.initial_state_unknown.then_some(Coordinate::new(-stroke(data), stroke(data))));
         coordinates
     }
@@ -72,6 +82,9 @@ impl Effect for AmplifierSlew {
         let rates = (2.0 * slowest, 0.8 * fastest);
         let starts: Vec<Vec<f64>> = match form {
             BOTH_WAYS | POWER => logarithms(rates, 20).map(|rate| vec![rate]).collect(),
+            WITH_TIME_CONSTANT => logarithms(rates, 10)
+                .flat_map(|rate| INITIAL_ROWS.map(|rows| vec![rate, (rows * data.sample_s).ln()]))
+                .collect(),
             _ => logarithms(rates, 10)
                 .flat_map(|rate| [INITIAL_RATIO.ln(), -INITIAL_RATIO.ln()].map(|apart| vec![rate, rate + apart]))
                 .collect(),
@@ -89,6 +102,10 @@ impl Effect for AmplifierSlew {
                 Quantity::new("slew_v_per_s", Dimension::VoltageRate, value),
                 Quantity::new("falling_v_per_s", Dimension::VoltageRate, point[1].exp()),
             ],
+            WITH_TIME_CONSTANT => vec![
+                Quantity::new("slew_v_per_s", Dimension::VoltageRate, value),
+                Quantity::new("tau_s", Dimension::Time, point[1].exp()),
+            ],
             _ => vec![Quantity::new("slew_v_per_s", Dimension::VoltageRate, value)],
         }
     }
@@ -99,12 +116,15 @@ impl Effect for AmplifierSlew {
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], data: &'a Data, chain: &mut Chain<'a>) {
         let value = point[0].exp();
-        chain.initial_v = point.get(RATES[form]).copied();
+        chain.initial_v = point.get(COORDINATES[form]).copied();
         if form == POWER {
             chain.power_v2_per_s = chain.power_v2_per_s.min(2.0 * stroke(data) * value);
             return;
         }
-        let falling = point[RATES[form] - 1].exp();
+        if form == WITH_TIME_CONSTANT {
+            chain.follow_tau_s = point[1].exp();
+        }
+        let falling = if form == TWO_RATES { point[1].exp() } else { value };
         chain.rising_v_per_s = chain.rising_v_per_s.min(value);
         chain.falling_v_per_s = chain.falling_v_per_s.min(falling);
     }

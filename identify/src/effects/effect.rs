@@ -182,6 +182,11 @@ pub trait Effect: Sync {
         &[]
     }
 
+    /// Returns true at a point where the effect cannot be distinguished from another cause, whose name it must not take.
+    fn is_another_cause(&self, _form: usize, _point: &[f64]) -> bool {
+        false
+    }
+
     /// Returns the logarithm of the number of independent candidates that a search for a form compares; the likelihood
     /// gain is reduced by this, in nats.
     fn ln_candidates(&self, _form: usize, _data: &Data) -> f64 {

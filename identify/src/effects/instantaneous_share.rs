@@ -1,11 +1,29 @@
 //! The feedthrough, the part of a step that is reached without delay, is not the nominal one.
+//!
+//! | form | |
+//! | --- | --- |
+//! | instantaneous | `y = share q + (1 - share) lag(tau; q)` |
+//! | quick | `y = share_0 q + part lag(quick; q) + (1 - share_0 - part) lag(tau; q)`, `share = share_0 + part`: a part takes a short time |
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
 use crate::plant::chain::Chain;
+use crate::plant::relaxation::Part;
 use crate::record::data::Data;
+use crate::record::scales::REFERENCE_TIME_CONSTANT_S;
 
 pub(super) struct InstantaneousShare;
+
+const QUICK: usize = 1;
+/// Shortest time of a quick part, in rows, and the longest, in reference time constants: a slower part is a relaxation.
+const SHORTEST: f64 = 0.05;
+const LONGEST: f64 = 0.1;
+
+/// Bounds of the time of a quick part, in s.
+fn times_s(data: &Data) -> (f64, f64) {
+    let shortest = SHORTEST * data.sample_s;
+    (shortest, (LONGEST * REFERENCE_TIME_CONSTANT_S).max(2.0 * shortest))
+}
 
 /// Nominal share from which initial points on both sides of it are added.
 const LARGE: f64 = 0.25;
@@ -27,27 +45,50 @@ impl Effect for InstantaneousShare {
         "steps read within a hundredth of the time constant"
     }
 
-    fn coordinates(&self, _: usize, data: &Data) -> Vec<Coordinate> {
+    fn forms(&self) -> usize {
+        2
+    }
+
+    fn common_forms(&self) -> usize {
+        1
+    }
+
+    fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
+        if form == QUICK {
+            let (shortest, longest) = times_s(data);
+            return vec![Coordinate::new(-1.0, 1.0), Coordinate::log(shortest, longest)];
+        }
         // A nominal share outside of 0 to 1 has room on both sides, too.
         let far = 2.0 * data.normalisation.share;
         vec![Coordinate::new(far.min(-0.2), far.max(1.0))]
     }
 
-    fn initial_points(&self, _: usize, context: &FitContext) -> Vec<Vec<f64>> {
+    fn initial_points(&self, form: usize, context: &FitContext) -> Vec<Vec<f64>> {
+        if form == QUICK {
+            let (shortest, longest) = times_s(context.data);
+            let times = [4.0 * shortest, 20.0 * shortest].into_iter().filter(|time| *time < longest);
+            return times.flat_map(|time| [0.1, -0.05].map(|part| vec![part, time.ln()])).collect();
+        }
         let nominal = context.data.normalisation.share;
         let of_large = [0.5 * nominal, 0.5 * (1.0 + nominal)].into_iter().filter(|_| nominal > LARGE);
         [0.04, 0.2].into_iter().chain(of_large).map(|share| vec![share]).collect()
     }
 
-    fn quantities(&self, _: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
-        vec![Quantity::new("share", Dimension::Ratio, point[0])]
+    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
+        let nominal = if form == QUICK { data.normalisation.share } else { 0.0 };
+        let time = (form == QUICK).then(|| Quantity::new("quick_s", Dimension::Time, point[1].exp()));
+        [Quantity::new("share", Dimension::Ratio, nominal + point[0])].into_iter().chain(time).collect()
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         None
     }
 
-    fn modify_chain<'a>(&self, _: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        chain.relaxation.share = point[0];
+    fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        if form != QUICK {
+            chain.relaxation.share = point[0];
+        } else if let Some(free) = chain.relaxation.further.iter_mut().find(|further| further.part == 0.0) {
+            *free = Part { part: point[0], tau_s: point[1].exp() };
+        }
     }
 }

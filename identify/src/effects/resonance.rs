@@ -27,6 +27,9 @@ const QUICK: usize = 2;
 /// Time constant `T` of the high-pass filter at initial points, in reference time constants.
 const QUICK_TIME_CONSTANT: f64 = 1.0 / 11.0;
 
+/// Distance from the largest damping ratio that counts as at it, relative to the ratio.
+const AT_BOUND: f64 = 1e-3;
+
 /// Returns the range of frequencies, in Hz, from one period per record to half a cycle per sample.
 fn range(data: &Data) -> (f64, f64) {
     (1.0 / data.duration_s().max(1e-6), 0.5 / data.sample_s)
@@ -90,6 +93,11 @@ impl Effect for Resonance {
             Quantity::new("freq_hz", Dimension::Frequency, point[0].exp()),
             Quantity::new("zeta", Dimension::Ratio, point[1].exp()),
         ]
+    }
+
+    /// What is as damped as that overshoots no more than two lags do.
+    fn is_another_cause(&self, _: usize, point: &[f64]) -> bool {
+        point[1] >= MOST_DAMPED.get().ln() - AT_BOUND
     }
 
     fn ln_candidates(&self, _: usize, _: &Data) -> f64 {

@@ -38,6 +38,9 @@ pub struct Chain<'a> {
     pub falling_v_per_s: f64,
     /// Largest rate of its square, with its sign, in V^2/s: the power of its charger.
     pub power_v2_per_s: f64,
+    /// Time constant with which the amplifier follows its command within the rate at which it rises, in s; 0 for none. A plant file cannot
+    /// hold it.
+    pub follow_tau_s: f64,
     /// Amplifier voltage before the first row, in V; `None` if it equals the command.
     pub initial_v: Option<f64>,
     /// Time constant of the amplifier's output resistance with the spring's capacitance, in s; 0 for none.
@@ -88,6 +91,7 @@ impl<'a> Chain<'a> {
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
             power_v2_per_s: f64::INFINITY,
+            follow_tau_s: 0.0,
             initial_v: None,
             output_tau_s: 0.0,
             delay_s: number(|amplifier| amplifier.delay_s, 0.0),
@@ -193,7 +197,9 @@ impl<'a> Chain<'a> {
             signal.map(|voltage| at_most(voltage.abs(), self.limit_v, self.knee_v).copysign(voltage));
         }
         signal.before = self.initial_v.unwrap_or(signal.before);
-        if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
+        if self.follow_tau_s > 0.0 {
+            *signal = signal.followed(self.rising_v_per_s, self.follow_tau_s);
+        } else if self.rising_v_per_s.is_finite() || self.falling_v_per_s.is_finite() {
             *signal = signal.slewed(self.rising_v_per_s, self.falling_v_per_s);
         }
         if self.power_v2_per_s.is_finite() {

@@ -37,11 +37,20 @@ impl Evaluated {
         misfit + self.penalty_factor * blocks.iter().map(|(block, _)| evaluator.price(block)).sum::<f64>()
     }
 
+    /// Score of a fit whose held-out log-likelihood is known, in nats; minus infinity if one of its blocks is another cause.
+    fn score(&self, evaluator: &impl Evaluator, fit: &Fit, held_out: f64) -> f64 {
+        let is_another = |(block, point): &(Block, Vec<f64>)| block.effect().is_another_cause(block.form, point);
+        if fit.model.blocks.iter().any(is_another) {
+            return f64::NEG_INFINITY;
+        }
+        held_out - self.price(evaluator, fit)
+    }
+
     /// Recomputes all scores with a penalty factor and with the present noise floor, which the first evaluations lacked.
     pub(super) fn reprice(&mut self, evaluator: &impl Evaluator, penalty_factor: f64) {
         self.penalty_factor = penalty_factor;
         let mut scored = std::mem::take(&mut self.scored);
-        scored.values_mut().for_each(|it| it.score = it.held_out - self.price(evaluator, &it.fit));
+        scored.values_mut().for_each(|it| it.score = self.score(evaluator, &it.fit, it.held_out));
         self.scored = scored;
     }
 
@@ -88,7 +97,7 @@ impl Evaluated {
     fn scored(&mut self, evaluator: &mut impl Evaluator, fit: Fit) -> Scored {
         let held_out = evaluator.held_out(&fit);
         self.floor_v = self.floor_v.min(fit.noise.floor_v());
-        let score = held_out - self.price(evaluator, &fit);
+        let score = self.score(evaluator, &fit, held_out);
         let scored = Scored { fit, held_out, score };
         self.scored.insert(scored.fit.model.structure(), scored.clone());
         scored
@@ -96,7 +105,7 @@ impl Evaluated {
 
     /// The best structure of each set of effects, the best set first.
     pub(super) fn ranked(&self) -> Vec<&Scored> {
-        let mut ranked: Vec<&Scored> = self.scored.values().collect();
+        let mut ranked: Vec<&Scored> = self.scored.values().filter(|scored| scored.score.is_finite()).collect();
         let key = |scored: &Scored| scored.fit.model.structure();
         ranked.sort_by(|a, b| b.score.total_cmp(&a.score).then_with(|| key(a).cmp(&key(b))));
         let mut sets = HashSet::new();
@@ -119,7 +128,7 @@ impl Evaluated {
     /// The best of all structures without an effect and without every effect that contains it as a special case.
     pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
         let has = |model: &Model| effects(model).into_iter().any(|other| other == effect || contains(other, effect));
-        let without = self.scored.values().filter(|scored| !has(&scored.fit.model));
+        let without = self.scored.values().filter(|scored| scored.score.is_finite() && !has(&scored.fit.model));
         without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
     }
 }

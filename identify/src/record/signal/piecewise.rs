@@ -19,6 +19,11 @@ pub struct Piece {
 
 /// Number of straight pieces that follow a root over one piece of its square.
 const PARTS_OF_ROOT: usize = 4;
+/// Largest number of straight pieces that follow a lag over one piece of its input, their duration in time constants, and the distance
+/// from the settled output, in V, from which one is enough.
+const PARTS_OF_LAG: usize = 14;
+const LAGS_PER_PART: f64 = 0.4;
+const SETTLED_V: f64 = 1e-3;
 
 /// A signal over time: contiguous straight pieces, which may jump at their borders.
 #[derive(Debug, Default)]
@@ -220,6 +225,38 @@ impl Signal {
         })
     }
 
+    /// Returns the output of an amplifier of one time constant, in s, that follows this signal at a rate of at most `slew`, in V/s, both
+    /// positive: `du/dt = (v - u) / tau` within `-slew` to `slew`.
+    pub fn followed(&self, slew: f64, tau_s: f64) -> Self {
+        let mut now = self.before;
+        self.rebuilt(|Piece { duration_s, from, to }, pieces| {
+            let slope = if duration_s > 0.0 { (to - from) / duration_s } else { 0.0 };
+            let mut passed_s = 0.0;
+            for part in 0..PARTS_OF_LAG {
+                let (ahead, left_s) = (from + slope * passed_s - now, duration_s - passed_s);
+                let beyond = ahead.abs() - slew * tau_s;
+                let (taken_s, then) = if beyond > 0.0 {
+                    let rate = slew.copysign(ahead);
+                    let closing = slew - slope * ahead.signum();
+                    // A little longer, so that rounding does not leave it beyond.
+                    let taken_s = if closing > 0.0 { left_s.min(1.000_001 * beyond / closing) } else { left_s };
+                    (taken_s, now + rate * taken_s)
+                } else {
+                    let unsettled = ahead - slope * tau_s;
+                    let is_last = part + 1 == PARTS_OF_LAG || unsettled.abs() < SETTLED_V;
+                    let taken_s = if is_last { left_s } else { left_s.min(LAGS_PER_PART * tau_s) };
+                    let behind = slope * tau_s + unsettled * (-taken_s / tau_s).exp();
+                    (taken_s, from + slope * (passed_s + taken_s) - behind)
+                };
+                pieces.push(Piece { duration_s: taken_s, from: now, to: then });
+                (now, passed_s) = (then, passed_s + taken_s);
+                if duration_s - passed_s <= ROUNDING_S {
+                    break;
+                }
+            }
+        })
+    }
+
     /// Returns the output of a charger of bounded power that follows the signal: the output's square, with its sign, changes by at most
     /// `rate` per s.
     pub fn charged(&self, rate: f64) -> Self {
@@ -388,6 +425,33 @@ mod tests {
             assert!((got - expected).abs() < 1e-9, "{got} {expected}");
         }
         assert_eq!(rows(&step().slewed(1e6, 1e6)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+    }
+
+    /// Compared with steps of a thousandth of a row.
+    #[test]
+    fn an_amplifier_of_one_time_constant_slews_far_from_its_input() {
+        let (slew, tau_s) = (40.0, 0.7);
+        let input = step();
+        let output = input.followed(slew, tau_s);
+        let (mut now, mut expected) = (input.before, Vec::new());
+        for piece in input.pieces() {
+            let steps = (1000.0 * piece.duration_s) as usize;
+            for step in 0..steps {
+                let voltage = piece.from + (piece.to - piece.from) * step as f64 / steps as f64;
+                now += ((voltage - now) / tau_s).clamp(-slew, slew) * piece.duration_s / steps as f64;
+            }
+            expected.push(now);
+        }
+        let (mut pieces, mut passed_s, mut until_s) = (output.pieces().iter(), 0.0, 0.0);
+        for (piece, expected) in input.pieces().iter().zip(expected) {
+            until_s += piece.duration_s;
+            let mut end = None;
+            while passed_s < until_s - 1e-9 {
+                let piece = pieces.next().unwrap();
+                (passed_s, end) = (passed_s + piece.duration_s, Some(piece.to));
+            }
+            assert!(end.is_none_or(|end| (end - expected).abs() < 0.2), "{end:?} {expected}");
+        }
     }
 
     #[test]
