@@ -87,8 +87,30 @@ impl Effect for InstantaneousShare {
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
         if form != QUICK {
             chain.relaxation.share = point[0];
-        } else if let Some(free) = chain.relaxation.further.iter_mut().find(|further| further.part == 0.0) {
-            *free = Part { part: point[0], tau_s: point[1].exp() };
+            return;
         }
+        chain.quick = Part { part: point[0], tau_s: point[1].exp() };
+        chain.set_further(chain.relaxation.further);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::index_of;
+    use crate::effects::model::{Block, Model};
+    use crate::plant::base::Base;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    #[test]
+    fn a_quick_part_stays_beside_creep() {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold);
+        let quick = Block { effect: index_of("instantaneous-share").unwrap(), form: QUICK };
+        let creep = Block { effect: index_of("second-relaxation").unwrap(), form: 0 };
+        let model = Model::default().with(quick, vec![0.07, 0.02f64.ln()]).with(creep, vec![0.2, 90f64.ln()]);
+        let parts = model.chain(&Base::paper(), &data).relaxation.further.map(|further| further.part);
+        assert_eq!(parts, [0.2, 0.07, 0.0]);
     }
 }

@@ -97,6 +97,7 @@ pub(super) fn best_decay(context: &FitContext) -> Option<Vec<f64>> {
     let errors = Errors::of(residual);
     let near_change = near_changes(data);
     let shortest = SHORTEST_RUN.count();
+    let places = shortest..data.rows().saturating_sub(shortest);
     let mut best: Option<(f64, Vec<f64>)> = None;
     for ln_time in logarithms(times_s(data), TIMES) {
         let (mut product, mut square) = (0.0, 0.0);
@@ -105,8 +106,8 @@ pub(super) fn best_decay(context: &FitContext) -> Option<Vec<f64>> {
             product = errors.smooth[row] + left * product;
             square = f64::from(u8::from(errors.seen[row])) + left * left * square;
             let (gain, shift) = (product * product / square.max(1e-9), product / square.max(1e-9));
-            let place = (shortest..data.rows() - shortest).contains(&row) && !near_change[row];
-            if place && best.as_ref().is_none_or(|(most, _)| gain > *most) && errors.is_abrupt(row, shift) {
+            let may_begin = places.contains(&row) && !near_change[row];
+            if may_begin && best.as_ref().is_none_or(|(most, _)| gain > *most) && errors.is_abrupt(row, shift) {
                 best = Some((gain, vec![row as f64, ln_time, shift]));
             }
         }

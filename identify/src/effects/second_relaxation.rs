@@ -106,12 +106,12 @@ impl Effect for SecondRelaxation {
             creep = added / (1.0 + added);
         }
         let slow_s = point[1].exp();
-        let relaxation = &mut chain.relaxation;
+        let tau_s = chain.relaxation.tau_s;
         let parts = |times: &[f64]| {
             let part = |&tau_s: &f64| Part { part: creep / times.len() as f64, tau_s };
             std::array::from_fn(|index| times.get(index).map(part).unwrap_or_default())
         };
-        relaxation.further = match form {
+        chain.set_further(match form {
             OF_THE_REST | OF_EVERYTHING | ADDED => parts(&[slow_s]),
             BY_DECADES => parts(&[0.1 * slow_s, slow_s, 10.0 * slow_s]),
             ADDED_BY_DECADES => {
@@ -120,10 +120,10 @@ impl Effect for SecondRelaxation {
                     |weight: f64, tau_s: f64| Part { part: creep * weight / (1.0 + ratio + ratio * ratio), tau_s };
                 [of_decade(1.0, 0.1 * slow_s), of_decade(ratio, slow_s), of_decade(ratio * ratio, 10.0 * slow_s)]
             }
-            _ => parts(&[slow_s, relaxation.tau_s * relaxation.tau_s / slow_s]),
-        };
+            _ => parts(&[slow_s, tau_s * tau_s / slow_s]),
+        });
         if !matches!(form, OF_THE_REST | SPREAD) {
-            relaxation.share *= 1.0 - creep;
+            chain.relaxation.share *= 1.0 - creep;
         }
     }
 }

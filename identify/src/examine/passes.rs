@@ -61,6 +61,8 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let reports = held.as_ref().is_some_and(|held| held.reported_change().is_some());
     let records = if reports { std::slice::from_ref(record) } else { new };
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
+    // New readings of a sensor that reports changes are ahead of the response, because noise decides when they are sent: a linear model of
+    // these alone is shown, but is no judge, and has not as many errors as there are readings.
     let linear = linear(new, options);
     compare(&mut found, linear.as_ref());
     credibility::unlikely_to_suspects(&mut found.report);

@@ -134,7 +134,8 @@ impl Observed {
 
     /// Returns the properties of a subset of the rows, with bounds and truncation as concluded from all rows.
     pub fn with_conclusions_of(self, all: &Self) -> Self {
-        let bounded = if all.all_exact() { self.without_bounds() } else { self };
+        let stops = all.kinds.iter().any(|kind| matches!(kind, Kind::AtLeast | Kind::AtMost));
+        let bounded = if stops { self } else { self.without_bounds() };
         Self { truncation_v: all.truncation_v, ..bounded }
     }
 
