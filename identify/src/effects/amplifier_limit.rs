@@ -66,7 +66,7 @@ impl Effect for AmplifierLimit {
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        // A plant file holds the limit without its knee.
+        // The lower limit counts; an equal one is that of a plant file, which holds no knee.
         if point[0] <= chain.limit_v {
             (chain.limit_v, chain.knee_v) = (point[0], if form == WITH_KNEE { point[1].exp() } else { 0.0 });
         }

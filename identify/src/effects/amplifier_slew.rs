@@ -27,6 +27,8 @@ const COORDINATES: [usize; 4] = [1, 2, 1, 2];
 const SHORTEST: f64 = 0.1;
 const LONGEST: f64 = 0.1;
 const INITIAL_ROWS: [f64; 2] = [2.0, 8.0];
+/// Largest step that an amplifier of one time constant takes without reaching its rate, relative to the full scale.
+const LARGEST_LAG: f64 = 0.5;
 /// Ratio of the two rates at initial points.
 const INITIAL_RATIO: f64 = 3.0;
 /// Distance of the initial voltage from the command at initial points, as a fraction of the full scale.
@@ -92,6 +94,11 @@ impl Effect for AmplifierSlew {
         // At an amplifier voltage equal to the command the derivative would vanish.
         let from_v = data.initial_state_unknown.then_some(data.command.before - INITIAL_DISTANCE * stroke(data));
         starts.into_iter().map(|start| start.into_iter().chain(from_v).collect()).collect()
+    }
+
+    /// An amplifier that reaches its rate in no step but the largest is a lag.
+    fn is_another_cause(&self, form: usize, point: &[f64], data: &Data) -> bool {
+        form == WITH_TIME_CONSTANT && (point[0] + point[1]).exp() > LARGEST_LAG * stroke(data)
     }
 
     /// The rate of a charger is that at the largest voltage.

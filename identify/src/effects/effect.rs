@@ -183,7 +183,7 @@ pub trait Effect: Sync {
     }
 
     /// Returns true at a point where the effect cannot be distinguished from another cause, whose name it must not take.
-    fn is_another_cause(&self, _form: usize, _point: &[f64]) -> bool {
+    fn is_another_cause(&self, _form: usize, _point: &[f64], _data: &Data) -> bool {
         false
     }
 

@@ -3,7 +3,7 @@
 //! | form | |
 //! | --- | --- |
 //! | instantaneous | `y = share q + (1 - share) lag(tau; q)` |
-//! | quick | `y = share_0 q + part lag(quick; q) + (1 - share_0 - part) lag(tau; q)`, `share = share_0 + part`: a part takes a short time |
+//! | quick | `y = share_0 q + part lag(quick; q) + (1 - share_0 - part) lag(tau; q)`: a part takes a short time |
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
@@ -74,10 +74,10 @@ impl Effect for InstantaneousShare {
         [0.04, 0.2].into_iter().chain(of_large).map(|share| vec![share]).collect()
     }
 
-    fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
-        let nominal = if form == QUICK { data.normalisation.share } else { 0.0 };
+    fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {
+        let name = if form == QUICK { "quick_share" } else { "share" };
         let time = (form == QUICK).then(|| Quantity::new("quick_s", Dimension::Time, point[1].exp()));
-        [Quantity::new("share", Dimension::Ratio, nominal + point[0])].into_iter().chain(time).collect()
+        [Quantity::new(name, Dimension::Ratio, point[0])].into_iter().chain(time).collect()
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

@@ -27,6 +27,8 @@ const LONGER: f64 = 0.1;
 const PLACES: usize = 20;
 /// Rounds of refinement.
 const REFINEMENTS: usize = 8;
+/// Scale of the median of five independent normal errors, relative to theirs.
+const NOISE_OF_MEDIAN: f64 = 0.536;
 /// Rows on each side of the beginning of a decay whose medians are compared, and the least change, relative to the shift.
 const NEXT_TO: usize = 5;
 const ABRUPT: f64 = 0.6;
@@ -47,7 +49,7 @@ pub(super) struct Ramped {
 
 impl Ramped {
     /// Numbers of rows of both ramps.
-    fn rows_of_ramps(&self) -> [usize; 2] {
+    pub(super) fn rows_of_ramps(&self) -> [usize; 2] {
         self.ramps.map(|ramp| ((ramp * (self.to - self.from) as f64) as usize).max(1))
     }
 
@@ -73,14 +75,17 @@ impl Errors {
         let seen: Vec<bool> = errors.iter().map(|error| !error.is_nan()).collect();
         let all: Vec<f64> = errors.iter().copied().filter(|error| !error.is_nan()).collect();
         let noise = robust_deviation(second_differences(&all)).unwrap_or(0.0);
-        let structure = all.iter().map(|error| error * error).sum::<f64>() - all.len() as f64 * noise * noise;
-        let mut smoothed = if all.len() < FEW_ROWS.count() { all } else { running_median(&all) }.into_iter();
+        let is_short = all.len() < FEW_ROWS.count();
+        let noise = if is_short { noise } else { NOISE_OF_MEDIAN * noise };
+        let smoothed = if is_short { all } else { running_median(&all) };
+        let structure = smoothed.iter().map(|error| error * error).sum::<f64>() - smoothed.len() as f64 * noise * noise;
+        let mut smoothed = smoothed.into_iter();
         let smooth = seen.iter().map(|&seen| if seen { smoothed.next().unwrap_or(0.0) } else { 0.0 }).collect();
         Self { smooth, seen, structure }
     }
 
     fn are_explained_by(&self, gain: f64) -> bool {
-        gain > MOST_OF_STRUCTURE.get() * self.structure
+        self.structure > 0.0 && gain > MOST_OF_STRUCTURE.get() * self.structure
     }
 
     fn is_abrupt(&self, row: usize, shift: f64) -> bool {
@@ -93,13 +98,18 @@ impl Errors {
 
 /// The decay that explains most of the residual, as first row, logarithm of its time in s, and shift in V; `None` if none explains most.
 pub(super) fn best_decay(context: &FitContext) -> Option<Vec<f64>> {
+    decay(context, logarithms(times_s(context.data), TIMES), true)
+}
+
+/// The decay of one of some times that explains most, wherever it begins; `is_new` asks for all that a first one needs.
+pub(super) fn decay(context: &FitContext, ln_times: impl Iterator<Item = f64>, is_new: bool) -> Option<Vec<f64>> {
     let FitContext { data, residual, .. } = context;
     let errors = Errors::of(residual);
     let near_change = near_changes(data);
     let shortest = SHORTEST_RUN.count();
     let places = shortest..data.rows().saturating_sub(shortest);
     let mut best: Option<(f64, Vec<f64>)> = None;
-    for ln_time in logarithms(times_s(data), TIMES) {
+    for ln_time in ln_times {
         let (mut product, mut square) = (0.0, 0.0);
         for row in (0..data.rows()).rev() {
             let left = data.time_s.get(row + 1).map_or(0.0, |next| (-(next - data.time_s[row]) / ln_time.exp()).exp());
@@ -107,12 +117,13 @@ pub(super) fn best_decay(context: &FitContext) -> Option<Vec<f64>> {
             square = f64::from(u8::from(errors.seen[row])) + left * left * square;
             let (gain, shift) = (product * product / square.max(1e-9), product / square.max(1e-9));
             let may_begin = places.contains(&row) && !near_change[row];
-            if may_begin && best.as_ref().is_none_or(|(most, _)| gain > *most) && errors.is_abrupt(row, shift) {
+            let is_best = may_begin && best.as_ref().is_none_or(|(most, _)| gain > *most);
+            if is_best && (!is_new || errors.is_abrupt(row, shift)) {
                 best = Some((gain, vec![row as f64, ln_time, shift]));
             }
         }
     }
-    best.filter(|(gain, _)| errors.are_explained_by(*gain)).map(|(_, point)| point)
+    best.filter(|(gain, _)| !is_new || errors.are_explained_by(*gain)).map(|(_, point)| point)
 }
 
 /// Whether a row is next to a change of a voltage that is held in between.
@@ -126,8 +137,8 @@ fn near_changes(data: &Data) -> Vec<bool> {
     if 2 * held > data.rows() { near } else { vec![false; data.rows()] }
 }
 
-/// The stretch with ramps that explains most of the residual, with its shift, in V; `None` if none explains most.
-pub(super) fn best_ramps(FitContext { residual, .. }: &FitContext) -> Option<(Ramped, f64)> {
+/// The stretch with ramps that explains most of the residual, with its shift, in V; `None` if none explains as much as a new one has to.
+pub(super) fn best_ramps(FitContext { residual, .. }: &FitContext, is_new: bool) -> Option<(Ramped, f64)> {
     let errors = Errors::of(residual);
     let (rows, shortest) = (residual.len(), 2 * SHORTEST_RUN.count());
     let sums = Sums::of(&errors);
@@ -152,7 +163,7 @@ pub(super) fn best_ramps(FitContext { residual, .. }: &FitContext) -> Option<(Ra
         ramps().for_each(|ramp| best.consider(Ramped { ramps: [ramp, best.stretch.ramps[1]], ..best.stretch }, &sums));
         ramps().for_each(|ramp| best.consider(Ramped { ramps: [best.stretch.ramps[0], ramp], ..best.stretch }, &sums));
     }
-    errors.are_explained_by(best.gain).then(|| (best.stretch, sums.gain(&best.stretch).1))
+    (!is_new || errors.are_explained_by(best.gain)).then(|| (best.stretch, sums.gain(&best.stretch).1))
 }
 
 /// The stretch that explains most so far, with the squared error that it explains, in V^2.
@@ -225,16 +236,26 @@ mod tests {
         of(&FitContext { data: &data, residual: &residual, sigma: 1.0 })
     }
 
-    fn decay(from: usize) -> impl Fn(usize) -> f64 {
+    fn new_ramps(context: &FitContext) -> Option<(Ramped, f64)> {
+        best_ramps(context, true)
+    }
+
+    fn decays(from: usize) -> impl Fn(usize) -> f64 {
         move |row| if row < from { 0.0 } else { -12.0 * (-((row - from) as f64) / 120.0).exp() }
     }
 
     #[test]
     fn a_decay_is_found_unless_it_begins_with_a_change_of_the_voltage() {
-        let found = search(best_decay, decay(640)).unwrap();
+        let found = search(best_decay, decays(640)).unwrap();
         assert!((found[0] - 640.0).abs() < 3.0 && (found[1].exp() / 120.0).ln().abs() < 0.7, "{found:?}");
         assert!(found[2] < -8.0, "{found:?}");
-        assert_eq!(search(best_decay, decay(600)), None);
+        assert_eq!(search(best_decay, decays(600)), None);
+    }
+
+    #[test]
+    fn far_readings_hide_no_decay() {
+        let found = search(best_decay, |row| decays(640)(row) + if row % 300 == 7 { 200.0 } else { 0.0 }).unwrap();
+        assert!((found[0] - 640.0).abs() < 3.0, "{found:?}");
     }
 
     #[test]
@@ -243,7 +264,7 @@ mod tests {
         let shape = |row: usize| if (500..900).contains(&row) { 6.0 * exact.at(row) } else { 0.0 };
         for hidden in [0..0, 550..650] {
             let error = |row: usize| if hidden.contains(&row) { f64::NAN } else { shape(row) };
-            let (Ramped { from, to, ramps }, shift) = search(best_ramps, error).unwrap();
+            let (Ramped { from, to, ramps }, shift) = search(new_ramps, error).unwrap();
             assert!(
                 from.abs_diff(500) < 20 && to.abs_diff(900) < 20 && (shift - 6.0).abs() < 0.3,
                 "{from} {to} {shift}"
@@ -260,7 +281,7 @@ mod tests {
         for found in [search(best_decay, wave), search(best_decay, growing), search(best_decay, with_voltage)] {
             assert_eq!(found, None);
         }
-        for found in [search(best_ramps, wave), search(best_ramps, with_voltage)] {
+        for found in [search(new_ramps, wave), search(new_ramps, with_voltage)] {
             assert_eq!(found, None);
         }
     }

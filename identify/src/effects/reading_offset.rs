@@ -12,7 +12,7 @@ use crate::dimension::Dimension;
 use crate::effects::boundary;
 use crate::effects::effect::{Affects, Coordinate, Effect, FitContext, Location, Quantity};
 use crate::effects::offset_levels::{Stretch, stretches};
-use crate::effects::passing_shift::{Ramped, best_decay, best_ramps, times_s};
+use crate::effects::passing_shift::{Ramped, best_decay, best_ramps, decay, times_s};
 use crate::record::data::Data;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::second_differences;
@@ -74,10 +74,12 @@ fn passing(form: usize, context: &FitContext) -> Option<Vec<f64>> {
     if context.data.is_joined() {
         return None;
     }
-    if form == DECAY {
-        return best_decay(context);
-    }
-    let (Ramped { from, to, ramps: [first, last] }, shift) = best_ramps(context)?;
+    if form == DECAY { best_decay(context) } else { ramps(context, true) }
+}
+
+/// Returns the point of the stretch with ramps that explains most.
+fn ramps(context: &FitContext, is_new: bool) -> Option<Vec<f64>> {
+    let (Ramped { from, to, ramps: [first, last] }, shift) = best_ramps(context, is_new)?;
     Some(vec![from as f64, to as f64, first, last, shift])
 }
 
@@ -89,7 +91,8 @@ fn shows_at_rest(data: &Data) -> bool {
     }
     let zero = median(&mut data.reading[..rest].to_vec()).unwrap_or(0.0);
     let error = robust_deviation(second_differences(&data.reading)).unwrap_or(0.0) / (rest as f64).sqrt();
-    zero.abs() > Z_ZERO * error
+    let unreported = data.unreported_v.as_ref().map_or(0.0, |changes| changes.iter().copied().fold(0.0, f64::max));
+    zero.abs() > unreported.max(Z_ZERO * error)
 }
 
 /// Returns the points of the runs whose shifts explain most, by level and by edges.
@@ -176,13 +179,17 @@ impl Effect for ReadingOffset {
             DECAY => Quantity::new("decay_s", Dimension::Time, point[1].exp()),
             _ => to(run.end.saturating_sub(1)),
         };
-        let length_s = data.time_s[run.end.min(last)] - data.time_s[run.start.min(last)];
-        let parts = if form == RAMPS { &point[2..4] } else { &[] };
-        let ramps = ["rise_s", "fall_s"].into_iter().zip(parts);
-        let ramps = ramps.map(|(name, part)| Quantity::new(name, Dimension::Time, part * length_s));
+        let time_s = |row: usize| data.time_s[row.min(last)];
+        let ramps = (form == RAMPS).then(|| {
+            let ramped = Ramped { from: run.start, to: run.end, ramps: [point[2], point[3]] };
+            let [first, fall] = ramped.rows_of_ramps();
+            let rise_s = time_s(run.start + first) - time_s(run.start);
+            let fall_s = time_s(run.end) - time_s(run.end - fall);
+            [("rise_s", rise_s), ("fall_s", fall_s)].map(|(name, time)| Quantity::new(name, Dimension::Time, time))
+        });
         let from = Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]);
         let offset = Quantity::new("offset", Dimension::ReadingDifference, offset);
-        [from, ends, offset].into_iter().chain(count).chain(ramps).collect()
+        [from, ends, offset].into_iter().chain(count).chain(ramps.into_iter().flatten()).collect()
     }
 
     fn ln_candidates(&self, form: usize, data: &Data) -> f64 {
@@ -207,7 +214,10 @@ impl Effect for ReadingOffset {
             return;
         }
         if matches!(form, DECAY | RAMPS) {
-            if let Some(best) = passing(form, context) {
+            // A fit has moved the time of a decay.
+            let found =
+                if form == DECAY { decay(context, [point[1]].into_iter(), false) } else { ramps(context, false) };
+            if let Some(best) = found {
                 point.copy_from_slice(&best);
             }
             return;

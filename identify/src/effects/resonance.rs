@@ -96,8 +96,8 @@ impl Effect for Resonance {
     }
 
     /// What is as damped as that overshoots no more than two lags do.
-    fn is_another_cause(&self, _: usize, point: &[f64]) -> bool {
-        point.get(1).is_some_and(|ln_zeta| *ln_zeta >= MOST_DAMPED.get().ln() - AT_BOUND)
+    fn is_another_cause(&self, _: usize, point: &[f64], _: &Data) -> bool {
+        point[1] >= MOST_DAMPED.get().ln() - AT_BOUND
     }
 
     fn ln_candidates(&self, _: usize, _: &Data) -> f64 {

@@ -61,12 +61,16 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let reports = held.as_ref().is_some_and(|held| held.reported_change().is_some());
     let records = if reports { std::slice::from_ref(record) } else { new };
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
-    // New readings of a sensor that reports changes are ahead of the response, because noise decides when they are sent: a linear model of
-    // these alone is shown, but is no judge, and has not as many errors as there are readings.
     let linear = linear(new, options);
-    compare(&mut found, linear.as_ref());
-    credibility::unlikely_to_suspects(&mut found.report);
-    hypothesise(&mut found, &records[0], options, linear.as_ref());
+    if reports {
+        // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
+        found.report.linear = linear.map(|linear| linear.error);
+        credibility::unlikely_to_suspects(&mut found.report);
+    } else {
+        compare(&mut found, linear.as_ref());
+        credibility::unlikely_to_suspects(&mut found.report);
+        hypothesise(&mut found, &records[0], options, linear.as_ref());
+    }
     if let Some(held) = &held {
         add_held(&mut found.report, held, &options.units);
     }
@@ -87,7 +91,9 @@ pub(super) struct Normalised {
 impl Normalised {
     /// True if the causes predict held-out segments clearly better than another nominal spring, whose error is given.
     fn predicts_better_than(&self, error: f64) -> bool {
-        !self.found.report.findings.is_empty() && self.held_out_rmse() < CLEARLY_BETTER * error
+        // The error of a reading that is known up to an interval is mostly zero, but not in the error that is given.
+        let is_comparable = self.found.observed.intervals() == 0;
+        is_comparable && !self.found.report.findings.is_empty() && self.held_out_rmse() < CLEARLY_BETTER * error
     }
 
     /// Root mean square of the held-out error, in the reading's unit.

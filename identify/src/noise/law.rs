@@ -106,7 +106,7 @@ impl Noise {
     }
 
     /// Returns log-probability and term of a reading that is known up to an interval: it stopped at a bound, was rounded to a
-    /// coarse step, or has a code next to missing ones. Returns `None` for any other.
+    /// coarse step, has a code next to missing ones, or was not reported. Returns `None` for any other.
     fn of_interval(&self, kind: Kind, residual: f64) -> Option<(f64, Term)> {
         match kind {
             // Rounded readings reach a bound half a step before it.

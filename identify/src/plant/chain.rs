@@ -206,7 +206,10 @@ impl<'a> Chain<'a> {
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
     pub fn amplify(&self, signal: &mut Signal) {
         if self.limit_v.is_finite() {
-            signal.map(|voltage| at_most(voltage.abs(), self.limit_v, self.knee_v).copysign(voltage));
+            // Zero at 0 V, which a large knee reaches.
+            let below = |voltage: f64| at_most(voltage, self.limit_v, self.knee_v);
+            let at_rest = below(0.0);
+            signal.map(|voltage| (below(voltage.abs()) - at_rest).copysign(voltage));
         }
         signal.before = self.initial_v.unwrap_or(signal.before);
         if self.follow_tau_s > 0.0 {

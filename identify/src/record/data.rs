@@ -6,6 +6,7 @@ use std::ops::Range;
 use simulation::record::Record;
 use simulation::schedule::{Between, Schedule};
 
+use crate::dimension::Dimension;
 use crate::record::decay::relaxes_from_earlier_input;
 use crate::record::folds::folds;
 use crate::record::held::held;
@@ -90,7 +91,8 @@ impl Data {
         let time_s: Vec<f64> = rows().map(|(row, _)| row.time_s).collect();
         let voltage_v: Vec<f64> = rows().map(|(row, _)| row.voltage_v).collect();
         let reading: Vec<f64> = rows().map(|(_, reading)| reading).collect();
-        let unreported_v = unreported(record).map(|all| all.into_iter().step_by(every).collect());
+        let unreported_v =
+            unreported(record, &normalisation.scales).map(|all| all.into_iter().step_by(every).collect());
         let first_v = voltage_v.first().copied().unwrap_or(0.0);
         let offset = normalisation.start.map_or(0.0, |start| start.offset);
         // Decided from all rows, so that a subset gets the same coordinates.
@@ -235,10 +237,14 @@ impl Data {
     }
 }
 
-/// Returns the changes that were not reported, of all rows with a reading.
-fn unreported(record: &Record) -> Option<Vec<f64>> {
-    let held = held(record)?;
-    let change = held.reported_change()?;
+/// Returns the changes that were not reported, of all rows with a reading of a normalised record. They are found in the file's numbers,
+/// as in `examine`: its printed digits and its zero count.
+fn unreported(record: &Record, scales: &Scales) -> Option<Vec<f64>> {
+    let mut file = record.clone();
+    let readings = file.rows.iter_mut().filter_map(|row| row.measured.as_mut());
+    readings.for_each(|reading| *reading = scales.restored(Dimension::Reading, *reading));
+    let held = held(&file)?;
+    let change = held.reported_change()? / scales.reading.abs();
     let rows = (0..record.rows.len()).filter(|&row| record.rows[row].measured.is_some());
     Some(rows.map(|row| if held.rows.binary_search(&row).is_ok() { change } else { 0.0 }).collect())
 }

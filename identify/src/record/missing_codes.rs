@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest changes across a code that prove that it is missing.
 const FEWEST_CHANGES: usize = 2;
+/// Smallest part of the readings whose neighbouring codes are both given: what is estimated without a search needs them.
+const FEWEST_KNOWN: f64 = 0.2;
 
 /// The interval around each reading that its code stands for, relative to the reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +21,7 @@ pub(super) struct Cells {
     pub(super) wider: Vec<Option<(f64, f64)>>,
 }
 
-/// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing. If some are, any other code between
+/// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing, or nearly every reading is next to one. If some are, any other code between
 /// two given ones that no reading shows counts as missing, too.
 pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cells> {
     let first = *reading.first()?;
@@ -46,7 +48,9 @@ pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cel
         let (below, above) = (half(code - 1), half(code + 1));
         (below + above > 1.0).then_some((-below * step, above * step))
     });
-    Some(Cells { missing, wider: wider.collect() })
+    let wider: Vec<Option<(f64, f64)>> = wider.collect();
+    let known = wider.iter().filter(|wider| wider.is_none()).count();
+    (known as f64 > FEWEST_KNOWN * wider.len() as f64).then_some(Cells { missing, wider })
 }
 
 #[cfg(test)]

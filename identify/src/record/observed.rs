@@ -184,6 +184,32 @@ impl Observed {
         residual.iter().zip(&self.kinds).map(error).collect()
     }
 
+    /// Returns the number of readings that are known up to an interval.
+    pub fn intervals(&self) -> usize {
+        self.kinds.iter().filter(|kind| matches!(kind, Kind::Within(..))).count()
+    }
+
+    /// Returns a residual in which that of a reading which is known up to an interval is the smallest error that explains it, in V.
+    pub fn outside<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
+        if self.intervals() == 0 {
+            return Cow::Borrowed(residual);
+        }
+        let smallest = |(row, &error): (usize, &f64)| match self.kinds[row] {
+            Kind::Within(low, high) => (error + low).max(0.0) + (error + high).min(0.0),
+            _ => error,
+        };
+        residual.iter().enumerate().map(smallest).collect()
+    }
+
+    /// Returns the residuals of the readings that are not known up to an interval only, in V; all of them if no reading is.
+    pub fn known<'r>(&self, residual: &'r [f64]) -> Cow<'r, [f64]> {
+        if self.intervals() == 0 {
+            return Cow::Borrowed(residual);
+        }
+        let known = residual.iter().zip(&self.kinds).filter(|(_, kind)| !matches!(kind, Kind::Within(..)));
+        known.map(|(error, _)| *error).collect()
+    }
+
     /// Returns the values of the rows whose readings are known but for noise and rounding.
     pub fn uncensored<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
         if self.all_exact() {

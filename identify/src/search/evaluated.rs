@@ -39,8 +39,7 @@ impl Evaluated {
 
     /// Score of a fit whose held-out log-likelihood is known, in nats; minus infinity if one of its blocks is another cause.
     fn score(&self, evaluator: &impl Evaluator, fit: &Fit, held_out: f64) -> f64 {
-        let is_another = |(block, point): &(Block, Vec<f64>)| block.effect().is_another_cause(block.form, point);
-        if fit.model.blocks.iter().any(is_another) {
+        if fit.model.blocks.iter().any(|(block, point)| evaluator.is_another_cause(block, point)) {
             return f64::NEG_INFINITY;
         }
         held_out - self.price(evaluator, fit)

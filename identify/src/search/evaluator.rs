@@ -1,5 +1,6 @@
 //! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use crate::adequacy;
@@ -71,6 +72,11 @@ pub trait Evaluator {
 
     /// Price of a block, in nats.
     fn price(&self, block: &Block) -> f64;
+
+    /// True if a block at a point cannot be distinguished from another cause, whose name it must not take.
+    fn is_another_cause(&self, _block: &Block, _point: &[f64]) -> bool {
+        false
+    }
 
     /// Log-likelihood, in nats, that a further block gains by correcting the form of the others, `times` as strong in power as
     /// assumed, above a noise floor of `floor_v` volts.
@@ -162,6 +168,10 @@ impl Evaluator for Engine<'_> {
             + PRICE_OF_COORDINATE.get() * fitted as f64
             + effect.ln_candidates(block.form, self.data)
             + (forms as f64).ln()
+    }
+
+    fn is_another_cause(&self, block: &Block, point: &[f64]) -> bool {
+        block.effect().is_another_cause(block.form, point, self.data)
     }
 
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {
@@ -285,6 +295,7 @@ fn is_promising(engine: &Engine, it: &Extension) -> bool {
 /// Predicts the gains of what could be added to one fit.
 struct Screening<'f> {
     fit: &'f Fit,
+    residual: Cow<'f, [f64]>,
     predictors: Vec<GainPredictor>,
     from_rest: Vec<f64>,
     sigma: f64,
@@ -297,13 +308,16 @@ impl<'f> Screening<'f> {
         let (autocorrelated, rounded) = (!fit.noise.autocorrelation.is_white(), fit.noise.half_step > 0.0);
         // The rounding error depends on the voltage, so that every effect would seem to explain it.
         if !rounded && (exhaustive || !autocorrelated) {
-            predictors.push(GainPredictor::new(engine, fit, Noise::robust(&fit.residual)));
+            let known = engine.observed.known(&fit.residual);
+            predictors.push(GainPredictor::new(engine, fit, Noise::robust(&known)));
         }
         if autocorrelated || rounded {
             predictors.push(GainPredictor::new(engine, fit, fit.noise.clone()));
         }
         let from_rest = engine.residual_from_rest(&fit.model);
-        Self { fit, predictors, from_rest, sigma: robust_scale(&fit.residual), exhaustive }
+        let residual = engine.observed.outside(&fit.residual);
+        let sigma = robust_scale(&engine.observed.known(&fit.residual));
+        Self { fit, residual, predictors, from_rest, sigma, exhaustive }
     }
 
     /// The blocks in some of their forms, as [`extensions`] returns them.
@@ -328,7 +342,7 @@ impl<'f> Screening<'f> {
             };
             for form in forms.clone() {
                 let block = Block { effect: index, form };
-                let scene = FitContext { data: engine.data, residual: &self.fit.residual, sigma: self.sigma };
+                let scene = FitContext { data: engine.data, residual: &self.residual, sigma: self.sigma };
                 let points = effect.initial_points(form, &scene);
                 let every = if scarce { points.len().div_ceil(STARTS_IF_SCARCE) } else { 1 };
                 let mut starts = Vec::new();

@@ -8,7 +8,7 @@ use crate::record::held::{Held, Reason};
 use crate::stats::thresholds::probability::Z;
 use crate::verdict::finding::explained;
 
-/// Adds the finding to a report, in the file's units, on the same record without the held readings.
+/// Adds the finding to a report, in the file's units, on the same record, without the held readings unless they are reports of changes.
 pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
     if held.reported_change().is_none() {
         report.rows += held.rows.len();
@@ -47,6 +47,8 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
             )
         }
     };
+    // What the readings that were sent say of the converter's step is less than what they say of the changes.
+    report.findings.retain(|finding| finding.cause != cause || held.reported_change().is_none());
     if report.findings.iter().any(|finding| finding.cause == cause) {
         return;
     }

@@ -235,7 +235,8 @@ impl Signal {
             for part in 0..PARTS_OF_LAG {
                 let (ahead, left_s) = (from + slope * passed_s - now, duration_s - passed_s);
                 let beyond = ahead.abs() - slew * tau_s;
-                let (taken_s, then) = if beyond > 0.0 {
+                let is_last = part + 1 == PARTS_OF_LAG;
+                let (taken_s, then) = if beyond > 1e-9 * slew * tau_s && !is_last {
                     let rate = slew.copysign(ahead);
                     let closing = slew - slope * ahead.signum();
                     // A little longer, so that rounding does not leave it beyond.
@@ -243,8 +244,8 @@ impl Signal {
                     (taken_s, now + rate * taken_s)
                 } else {
                     let unsettled = ahead - slope * tau_s;
-                    let is_last = part + 1 == PARTS_OF_LAG || unsettled.abs() < SETTLED_V;
-                    let taken_s = if is_last { left_s } else { left_s.min(LAGS_PER_PART * tau_s) };
+                    let takes_all = is_last || unsettled.abs() < SETTLED_V;
+                    let taken_s = if takes_all { left_s } else { left_s.min(LAGS_PER_PART * tau_s) };
                     let behind = slope * tau_s + unsettled * (-taken_s / tau_s).exp();
                     (taken_s, from + slope * (passed_s + taken_s) - behind)
                 };
