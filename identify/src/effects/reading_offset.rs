@@ -184,7 +184,7 @@ impl Effect for ReadingOffset {
             let ramped = Ramped { from: run.start, to: run.end, ramps: [point[2], point[3]] };
             let [first, fall] = ramped.rows_of_ramps();
             let rise_s = time_s(run.start + first) - time_s(run.start);
-            let fall_s = time_s(run.end) - time_s(run.end - fall);
+            let fall_s = time_s(run.end) - time_s(run.end.saturating_sub(fall));
             [("rise_s", rise_s), ("fall_s", fall_s)].map(|(name, time)| Quantity::new(name, Dimension::Time, time))
         });
         let from = Quantity::new("from_s", Dimension::TimePoint, data.time_s[run.start.min(last)]);

@@ -81,9 +81,7 @@ fn reported(problem: &Problem, best: &Scored, rivals: &Rivals, nats: [f64; 2]) -
     let scales = problem.data.scales();
     let fit = &best.fit;
     let words = text(&fit.structure, problem.data.initial_state_unknown);
-    let size = |residual: &[f64]| {
-        scales.restored(Dimension::ReadingSize, root_mean_square(&problem.observed.errors(residual)))
-    };
+    let size = |residual: &[f64]| scales.restored(Dimension::ReadingSize, problem.observed.rms(residual));
     let plant = plant(fit, rivals.nominal, scales.output, &problem.scale).map_err(str::to_owned).and_then(|file| {
         let file = problem.data.normalisation.restored_plant(&file);
         file.check().map_err(|error| error.to_string())?;

@@ -13,6 +13,7 @@ use crate::record::heteroscedasticity;
 use crate::record::missing_codes;
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::record::scales::Scales;
+use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{COARSE, FINEST_V, LEAST_TRUNCATION};
 
 /// What one reading says about the true value.
@@ -182,6 +183,13 @@ impl Observed {
             Kind::AtMost => r.min(0.0),
         };
         residual.iter().zip(&self.kinds).map(error).collect()
+    }
+
+    /// Returns the root mean square of the smallest errors that explain the readings, in V. Readings that are known up to an interval add
+    /// their errors, but not their number: most have none, and would lower the mean of the others.
+    pub fn rms(&self, residual: &[f64]) -> f64 {
+        let errors = self.errors(residual);
+        (dot(&errors, &errors) / (errors.len().saturating_sub(self.intervals())).max(1) as f64).sqrt()
     }
 
     /// Returns the number of readings that are known up to an interval.

@@ -7,7 +7,7 @@ use crate::fit::engine::Engine;
 use crate::search::{Explored, Scored};
 use crate::verdict::cause::Cause;
 use crate::verdict::form_average::parameters_over_forms;
-use crate::verdict::ranking::{named, rms};
+use crate::verdict::ranking::named;
 
 /// Largest odds that are converted to a probability, in nats.
 const LARGEST_ODDS: f64 = 40.0;
@@ -23,7 +23,7 @@ pub(crate) fn finding(engine: &mut Engine, best: &Scored, explored: &Explored, c
     let effect = *effect;
     let odds = best.score - without.score;
     let (data, observed) = (engine.data, engine.observed);
-    let [before, rival, after] = [left_out, without, best].map(|scored| rms(observed, &scored.fit.residual));
+    let [before, rival, after] = [left_out, without, best].map(|scored| observed.rms(&scored.fit.residual));
     let others = named(&without.fit.model);
     let rival = data.scales().shown_in_four_digits(Dimension::ReadingSize, rival);
     let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others };

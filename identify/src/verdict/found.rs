@@ -4,7 +4,6 @@ use crate::adequacy::{self, Candidate, Unidentifiable, When};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::search::{Explored, Scored, Search, WarmStart, effects};
-use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
 use crate::verdict::cause::Cause;
@@ -51,7 +50,7 @@ pub(crate) fn search(
         Some(warm_start) => search.run_from(warm_start, progress),
     };
     search.evaluator().budget().close();
-    let error = |residual: &[f64]| root_mean_square(&observed.errors(residual));
+    let error = |residual: &[f64]| observed.rms(residual);
     let most = LARGEST_ERROR_RATIO.get() * error(&baseline.residual);
     let is_larger = |fit: &Fit| error(&fit.residual) > most;
     let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));

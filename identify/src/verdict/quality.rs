@@ -15,10 +15,10 @@ use crate::stats::thresholds::probability::Z;
 const LAGS: usize = 20;
 
 /// Errors of a fit. `held_out` is its residual on held-out segments, in V; `stops` says that the simulation includes bounds at
-/// which readings saturate, so that rows at a bound count only where the fit is within it.
+/// which readings saturate, so that rows at a bound count only where the fit is within it ([`rms`](crate::record::observed::Observed::rms)).
 pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool) -> Quality {
     let observed = engine.observed;
-    let error = |residual: &[f64]| root_mean_square(&if stops { observed.errors(residual) } else { residual.into() });
+    let error = |residual: &[f64]| if stops { observed.rms(residual) } else { root_mean_square(residual) };
     let rmse = error(&fit.residual);
     let spread = root_mean_square(&centred(&engine.data.reading));
     Quality {

@@ -7,9 +7,7 @@ use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
-use crate::record::observed::Observed;
 use crate::search::{Evaluator, Scored, Search, effects};
-use crate::stats::scale::root_mean_square;
 use crate::verdict::cause::Cause;
 
 /// A set of causes in its best forms, with its score and errors.
@@ -57,8 +55,8 @@ pub(crate) fn ranking(
     let (data, observed, base) = (engine.data, engine.observed, engine.base());
     let mut ranked = |scored: &Scored| {
         let held_out_rmse = match known.iter().find(|(other, _)| other.model == scored.fit.model) {
-            Some((_, held_out)) => rms(observed, held_out),
-            None => rms(observed, &engine.held_out_residual(&scored.fit)),
+            Some((_, held_out)) => observed.rms(held_out),
+            None => observed.rms(&engine.held_out_residual(&scored.fit)),
         };
         let without = causes.iter().filter(|cause| is_same(&cause.without, scored));
         RankedCauses {
@@ -66,16 +64,11 @@ pub(crate) fn ranking(
             best_without: without.map(|cause| EFFECTS[cause.effect].cause()).collect(),
             values: values(data, base, &scored.fit.model),
             score: scored.score,
-            rmse: rms(observed, &scored.fit.residual),
+            rmse: observed.rms(&scored.fit.residual),
             held_out_rmse,
         }
     };
     contenders.iter().map(&mut ranked).collect()
-}
-
-/// Root mean square of a residual, in V; readings at a bound count only where the prediction is within it.
-pub(crate) fn rms(observed: &Observed, residual: &[f64]) -> f64 {
-    root_mean_square(&observed.errors(residual))
 }
 
 /// The causes of a model joined by "and".

@@ -19,7 +19,7 @@ const LEAST_STEP_PER_ERROR: f64 = 0.2;
 pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isolated: bool) -> Vec<Finding> {
     let mut findings = Vec::new();
     let raw = root_mean_square(&fit.residual);
-    let stopped_raw = root_mean_square(&observed.errors(&fit.residual));
+    let stopped_raw = observed.rms(&fit.residual);
     // An error that nothing explains does not make coarse steps fine.
     let noise_v = observed.scatter_v.max(LEAST_STEP_PER_ERROR * stopped_raw);
     let predicted: Vec<f64> = data.reading.iter().zip(&fit.residual).map(|(reading, left)| reading - left).collect();

@@ -16,7 +16,6 @@ use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
 use crate::search::{Explored, Scored, Search, effects};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
-use crate::verdict::ranking::rms;
 
 /// Largest number of suspects that are listed.
 const MOST_SUSPECTS: usize = 5;
@@ -88,5 +87,5 @@ fn is_seen(without: &Fit, with: &Fit) -> bool {
 /// Root mean square error of a fit in V, of held-out segments or of single readings.
 fn error(engine: &mut Engine, fit: &Fit, of_segments: bool) -> f64 {
     let residual = if of_segments { engine.held_out_residual(fit) } else { engine.leave_one_out_residual(fit) };
-    rms(engine.observed, &residual)
+    engine.observed.rms(&residual)
 }
