@@ -21,6 +21,7 @@ use simulation::record::Record;
 
 use crate::answer::{Nominal, Report, SearchReport, Verdict};
 use crate::effects::index_of;
+use crate::effects::model::Model;
 use crate::examine::hypothesis::hypothesise;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
@@ -62,15 +63,12 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let records = if reports { std::slice::from_ref(record) } else { new };
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
     let linear = linear(new, options);
-    if reports {
-        // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
-        found.report.linear = linear.map(|linear| linear.error);
-        credibility::unlikely_to_suspects(&mut found.report);
-    } else {
-        compare(&mut found, linear.as_ref());
-        credibility::unlikely_to_suspects(&mut found.report);
-        hypothesise(&mut found, &records[0], options, linear.as_ref());
-    }
+    found.report.linear = linear.as_ref().map(|linear| linear.error);
+    // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
+    let judge = linear.as_ref().filter(|_| !reports);
+    compare(&mut found, judge);
+    credibility::unlikely_to_suspects(&mut found.report);
+    hypothesise(&mut found, &records[0], options, judge);
     if let Some(held) = &held {
         add_held(&mut found.report, held, &options.units);
     }
@@ -264,24 +262,22 @@ fn as_cut_off(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: 
 fn prefers(record: &ExaminedRecord, base: &Base, cut: &Observed, found: &Diagnosis) -> bool {
     let shift = index_of("reading-offset").expect("an effect");
     let model = found.extended.model.without(shift);
-    let likelihood = |observed| {
-        let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
-        engine.fit_twice(model.clone()).log_likelihood
-    };
-    likelihood(cut) > likelihood(&found.observed)
+    likelihood(record, base, cut, &model) > likelihood(record, base, &found.observed, &model)
+}
+
+/// Returns the log-likelihood of a model that is fitted to the readings as they are observed, in nats.
+fn likelihood(record: &ExaminedRecord, base: &Base, observed: &Observed, model: &Model) -> f64 {
+    let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
+    engine.fit_twice(model.clone()).log_likelihood
 }
 
 /// Third pass: searches with the missing codes of a converter read as their lower or their upper neighbours, if the causes that were found
 /// fit one of these as well as any: a reading that may be either says less, and on one side of a code only.
 fn with_missing_codes(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
     let model = &found.extended.model;
-    let likelihood = |observed: &Observed| {
-        let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
-        engine.fit_twice(model.clone()).log_likelihood
-    };
     let sides = [true, false].into_iter().filter(|_| !record.budget.is_over());
     let sides = sides.filter_map(|below| found.observed.reading_missing_codes_as(below));
-    let best = sides.map(|side| (likelihood(&side), side)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let best = sides.map(|side| (likelihood(record, base, &side, model), side)).max_by(|a, b| a.0.total_cmp(&b.0));
     // Where either neighbour may be read, each has half of the probability.
     let either = found.extended.log_likelihood
         - std::f64::consts::LN_2 * found.observed.count_missing(&found.extended.residual) as f64;

@@ -29,6 +29,23 @@ pub enum Kind {
     AtMost,
 }
 
+impl Kind {
+    /// True for a reading that is known up to an interval.
+    fn is_interval(&self) -> bool {
+        matches!(self, Self::Within(..))
+    }
+
+    /// Returns the smallest error that explains a reading with a residual, both in V.
+    fn error(&self, residual: f64) -> f64 {
+        match self {
+            Self::Exact => residual,
+            Self::Within(low, high) => (residual + low).max(0.0) + (residual + high).min(0.0),
+            Self::AtLeast => residual.max(0.0),
+            Self::AtMost => residual.min(0.0),
+        }
+    }
+}
+
 /// What is known about the readings before any model is fitted.
 #[derive(Clone, Debug)]
 pub struct Observed {
@@ -167,7 +184,7 @@ impl Observed {
     pub fn count_missing(&self, residual: &[f64]) -> usize {
         let half = self.grid.map_or(0.0, |grid| 0.5 * grid.step);
         let rows = residual.iter().zip(&self.kinds);
-        rows.filter(|(left, kind)| matches!(kind, Kind::Within(..)) && left.abs() > half).count()
+        rows.filter(|(left, kind)| kind.is_interval() && left.abs() > half).count()
     }
 
     /// Returns the smallest error of each row that explains its reading, in V: 0 for a reading at a bound when the
@@ -176,13 +193,7 @@ impl Observed {
         if self.all_exact() {
             return Cow::Borrowed(residual);
         }
-        let error = |(&r, kind): (&f64, &Kind)| match kind {
-            Kind::Exact => r,
-            Kind::Within(low, high) => (r + low).max(0.0) + (r + high).min(0.0),
-            Kind::AtLeast => r.max(0.0),
-            Kind::AtMost => r.min(0.0),
-        };
-        residual.iter().zip(&self.kinds).map(error).collect()
+        residual.iter().zip(&self.kinds).map(|(&residual, kind)| kind.error(residual)).collect()
     }
 
     /// Returns the root mean square of the smallest errors that explain the readings, in V. Readings that are known up to an interval add
@@ -194,7 +205,7 @@ impl Observed {
 
     /// Returns the number of readings that are known up to an interval.
     pub fn intervals(&self) -> usize {
-        self.kinds.iter().filter(|kind| matches!(kind, Kind::Within(..))).count()
+        self.kinds.iter().filter(|kind| kind.is_interval()).count()
     }
 
     /// Returns a residual in which that of a reading which is known up to an interval is the smallest error that explains it, in V.
@@ -202,11 +213,8 @@ impl Observed {
         if self.intervals() == 0 {
             return Cow::Borrowed(residual);
         }
-        let smallest = |(row, &error): (usize, &f64)| match self.kinds[row] {
-            Kind::Within(low, high) => (error + low).max(0.0) + (error + high).min(0.0),
-            _ => error,
-        };
-        residual.iter().enumerate().map(smallest).collect()
+        let rows = residual.iter().zip(&self.kinds);
+        rows.map(|(&residual, kind)| if kind.is_interval() { kind.error(residual) } else { residual }).collect()
     }
 
     /// Returns the residuals of the readings that are not known up to an interval only, in V; all of them if no reading is.
@@ -214,7 +222,7 @@ impl Observed {
         if self.intervals() == 0 {
             return Cow::Borrowed(residual);
         }
-        let known = residual.iter().zip(&self.kinds).filter(|(_, kind)| !matches!(kind, Kind::Within(..)));
+        let known = residual.iter().zip(&self.kinds).filter(|(_, kind)| !kind.is_interval());
         known.map(|(error, _)| *error).collect()
     }
 
