@@ -24,6 +24,8 @@ struct Tabulated {
     clean: f64,
     /// Effect that only an exhaustive search finds.
     hidden: Option<usize>,
+    /// Effect that cannot be distinguished from another cause.
+    another: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
     fits: isize,
     /// Number of fits at which the search has to end.
@@ -43,6 +45,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         quiet: None,
         clean: f64::INFINITY,
         hidden: None,
+        another: None,
         fits: 0,
         most_fits: isize::MAX,
     }
@@ -65,6 +68,10 @@ impl Evaluator for Tabulated {
             white_noise_log_likelihood: log_likelihood,
             initial_state_cost: 0.0,
         }
+    }
+
+    fn is_another_cause(&self, block: &Block, _: &[f64]) -> bool {
+        self.another == Some(block.effect)
     }
 
     fn at(&mut self, model: Model) -> Fit {
@@ -127,6 +134,17 @@ fn a_block_is_added_if_it_gains_more_than_its_price() {
     assert_eq!(found(&mut evaluator), ["delay", "hum"]);
     // Each structure is fitted once for each that it extends, and evaluated once.
     assert!(evaluator.fits < 200, "{} fits", evaluator.fits);
+}
+
+#[test]
+fn a_block_that_is_another_cause_is_neither_found_nor_ranked() {
+    let mut evaluator = tabulated(&[(&["resonance"], 90.0), (&["series-lag"], 60.0)]);
+    assert_eq!(found(&mut evaluator), ["resonance"]);
+    evaluator.another = Some(effect("resonance"));
+    let mut search = Search::new(&mut evaluator);
+    let best = search.run(|_| ());
+    assert!(best.fit.model.has(effect("series-lag")) && !best.fit.model.has(effect("resonance")));
+    assert!(search.ranked().iter().all(|scored| !scored.fit.model.has(effect("resonance"))));
 }
 
 #[test]
