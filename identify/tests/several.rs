@@ -112,3 +112,40 @@ fn a_cause_that_most_records_do_not_show_alone_is_found_in_all_of_them() {
     let found = &several.report.findings[0].parameters[0].1;
     assert!(1.0 < found.low && found.low < gain && gain < found.high, "{found:?}");
 }
+
+/// The record of a sensor that reports a reading only if it differs from the last one by at least `least_v`.
+fn reported(mut record: Record, least_v: f64) -> Record {
+    let mut last = f64::INFINITY;
+    for row in &mut record.rows {
+        let new = row.measured.expect("a reading in each row");
+        if (new - last).abs() >= least_v {
+            last = new;
+        }
+        row.measured = Some(last);
+    }
+    record
+}
+
+#[test]
+fn a_sensor_that_reports_changes_is_found_in_its_record_or_in_all() {
+    const LEAST_V: f64 = 6.0;
+    let test = Test { noise_v: 1.0, volts: [300.0, 0.0, 500.0, 250.0, 100.0], ..PLAIN };
+    let other = Test { volts: [200.0, 500.0, 300.0, 0.0, 400.0], ..test };
+    let all =
+        [("first", &test), ("second", &other)].map(|(name, test)| reported(record(name, 1.1, 5.5, test), LEAST_V));
+    let [first, second] = all.clone();
+    let mixed = [first, record("second", 1.1, 5.5, &other), second];
+    let several = examine_several(&mixed, &Options::default(), |_| ()).unwrap();
+    let report = &several.report;
+    assert_eq!((causes(&several), report.rows), (vec!["gain-error"], 1500), "{report:#?}");
+    let of_records = report.records.iter().map(|of| of.findings.iter().map(|finding| finding.cause).collect());
+    let of_records: Vec<Vec<&str>> = of_records.collect();
+    assert_eq!(of_records, [vec!["quantisation"], vec![], vec!["quantisation"]], "{report:#?}");
+
+    let several = examine_several(&all, &Options::default(), |_| ()).unwrap();
+    let report = &several.report;
+    assert_eq!((causes(&several), report.rows), (vec!["gain-error", "quantisation"], 1000), "{report:#?}");
+    assert!(report.records.iter().all(|of| of.findings.is_empty()), "{report:#?}");
+    let step = report.findings.iter().find(|finding| finding.cause == "quantisation").unwrap().parameters[0].1.value;
+    assert!((LEAST_V..1.2 * LEAST_V).contains(&step), "{step}");
+}

@@ -49,7 +49,7 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let mut groups = features(data);
     let count: usize = groups.iter().map(|group| group.columns.len()).sum();
     if data.rows() < ROWS_PER_FEATURE.count() * count {
-        return Some(serial_correlation(data, fit));
+        return Some(serial_correlation(engine, fit));
     }
     let terms = engine.terms(&fit.noise, &fit.residual);
     let roots: Vec<f64> = terms.iter().map(|term| term.weight.sqrt()).collect();
@@ -95,14 +95,14 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
 }
 
 /// Correlation of each error with the one before it, by von Neumann's ratio.
-fn serial_correlation(data: &Data, fit: &Fit) -> UnmodelledDynamics {
-    let errors = &fit.noise.innovations(&fit.residual);
+fn serial_correlation(engine: &Engine, fit: &Fit) -> UnmodelledDynamics {
+    let errors = &fit.noise.innovations(&engine.observed.outside(&fit.residual));
     let squares: f64 = errors.iter().map(|error| error * error).sum();
     let steps: f64 = errors.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let share = 1.0 - 0.5 * steps / squares.max(1e-300);
     let rows = errors.len() as f64;
     UnmodelledDynamics {
-        place: "correlation of successive errors".to_owned() + &Localisation::new(data, errors).words(),
+        place: "correlation of successive errors".to_owned() + &Localisation::new(engine.data, errors).words(),
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
         significant: share * rows.sqrt() > Z_SHORT_RECORD,

@@ -88,7 +88,7 @@ impl<'a> Problem<'a> {
         self.reading.iter().zip(&prediction).map(|(reading, of)| reading - of).collect()
     }
 
-    /// Returns the rows that are fitted: readings that did not stop at a bound and are not of the fold `without`.
+    /// Returns the rows that are fitted: readings that are known but for noise and are not of the fold `without`.
     pub(super) fn used(&self, without: Option<u8>) -> Vec<bool> {
         let rows = self.observed.kinds.iter().zip(&self.data.fold);
         rows.map(|(kind, fold)| *kind == Reading::Exact && Some(*fold) != without).collect()

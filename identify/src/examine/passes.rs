@@ -13,6 +13,8 @@
 //! `CLEARLY_LIKELIER` nats. A pass that is kept replaces the diagnosis of the pass before it, and starts from that one's best
 //! models.
 
+use std::borrow::Cow;
+
 use anyhow::Result;
 
 use simulation::bad_input;
@@ -29,7 +31,7 @@ use crate::fit::engine::Engine;
 use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
 use crate::record::data::Data;
-use crate::record::held::held;
+use crate::record::held::{Held, held};
 use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
@@ -57,15 +59,12 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
     let held = held(record);
-    let shorter = held.as_ref().map(|held| held.left_out(record));
-    let new = std::slice::from_ref(shorter.as_ref().unwrap_or(record));
-    let reports = held.as_ref().is_some_and(|held| held.reported_change().is_some());
-    let records = if reports { std::slice::from_ref(record) } else { new };
+    let informative = informative(record, held.as_ref());
+    let records = std::slice::from_ref(&*informative);
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
-    let linear = linear(new, options);
+    let linear = linear(records, options);
     found.report.linear = linear.as_ref().map(|linear| linear.error);
-    // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
-    let judge = linear.as_ref().filter(|_| !reports);
+    let judge = linear.as_ref().filter(|_| is_judged_by_linear(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
     hypothesise(&mut found, &records[0], options, judge);
@@ -73,6 +72,20 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
         add_held(&mut found.report, held, &options.units);
     }
     Ok(found)
+}
+
+/// Returns the record without the held readings that say nothing of the response.
+pub(super) fn informative<'r>(record: &'r Record, held: Option<&Held>) -> Cow<'r, Record> {
+    match held {
+        Some(held) if held.reported_change().is_none() => Cow::Owned(held.left_out(record)),
+        _ => Cow::Borrowed(record),
+    }
+}
+
+/// Returns false for the record of a sensor that reports changes: its new readings are ahead of the response, because noise decides when
+/// they are sent, so that a linear model of them is no judge.
+pub(super) fn is_judged_by_linear(held: Option<&Held>) -> bool {
+    held.is_none_or(|held| held.reported_change().is_none())
 }
 
 /// The best linear model of some records.

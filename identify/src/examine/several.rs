@@ -19,14 +19,16 @@ use simulation::record::Record;
 use crate::answer::{RecordReport, Report, Verdict};
 use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{self, examine, joint};
+use crate::examine::passes::{self, examine, informative, is_judged_by_linear, joint};
 use crate::plant::base::Base;
+use crate::record::held::{Held, held};
 use crate::stats::median::median;
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::probability::{CLEARLY_LIKELIER, Z_ZERO};
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
+use crate::verdict::held_findings::add_held;
 use crate::verdict::linear_rival::compare;
 
 /// Causes that are looked for in each record alone: a hum has a phase of its own in each, and each has a zero of its own.
@@ -44,6 +46,11 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     // A gain and a relaxation that all records share, and a zero for each, are not estimated anew for every set of causes.
     let options = &options.with_fixed_plant();
+    let rows = records.iter().flat_map(|record| &record.rows).filter(|row| row.measured.is_some()).count();
+    let held: Vec<Option<Held>> = records.iter().map(held).collect();
+    let informative: Vec<Record> =
+        records.iter().zip(&held).map(|(record, held)| informative(record, held.as_ref()).into_owned()).collect();
+    let records = &informative[..];
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
@@ -65,7 +72,14 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     spring.unmodelled = None;
     let plant = "the spring with the shared causes".to_owned();
     let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
-    for (record, mut offset) in records.iter().zip(joint.zero_offsets.clone()) {
+    // What all sensors do is shown by the longest record.
+    let shared_held = || held.iter().flatten().max_by_key(|held| held.rows.len());
+    if let Some(shared) =
+        shared_held().filter(|of| held.iter().all(|held| held.as_ref().is_some_and(|held| held.reason == of.reason)))
+    {
+        add_held(&mut joint.report, shared, &options.units);
+    }
+    for ((record, held), mut offset) in records.iter().zip(&held).zip(joint.zero_offsets.clone()) {
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
             let from_zero = std::slice::from_ref(&from_zero);
@@ -81,6 +95,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
             offset += left;
             alone = from(offset)?;
         }
+        if let Some(held) = held {
+            add_held(&mut alone.report, held, &options.units);
+        }
         joint.report.complete &= alone.report.complete;
         joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
     }
@@ -90,13 +107,14 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         let Report { findings, alternatives, .. } = &joint.report;
         joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
     }
-    joint.report.verdict = verdict;
+    (joint.report.verdict, joint.report.rows) = (verdict, rows);
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, linear.as_ref());
+    let is_judged = held.iter().all(|held| is_judged_by_linear(held.as_ref()));
+    compare(&mut joint, linear.as_ref().filter(|_| is_judged));
     credibility::unlikely_to_suspects(&mut joint.report);
     Ok(joint)
 }

@@ -528,7 +528,7 @@ impl<'a> Engine<'a> {
                 start.estimate.follow(&mut column, &start.kernels);
                 self.budget.spend(start.kernels.len() as u64 * work::FOLLOWING * column.len() as u64);
             }
-            // Rows that stopped at a bound are not whitened.
+            // Readings that stopped at a bound or are known up to an interval are not whitened.
             let mut white = noise.whitened(&column);
             self.budget.spend(work::WHITENING * column.len() as u64);
             for (row, kind) in self.observed.kinds.iter().enumerate() {

@@ -116,6 +116,7 @@ impl Noise {
                 Some((log, Term { residual: -term.residual, ..term }))
             }
             Kind::Within(low, high) => Some(in_cell(residual + 0.5 * (low + high), self.marginal, 0.5 * (high - low))),
+            Kind::Unreported(change) => Some(in_cell(residual, self.marginal, change)),
             Kind::Exact if self.half_step > 0.0 => Some(in_cell(residual, self.sigma, self.half_step)),
             Kind::Exact => None,
         }
@@ -162,8 +163,8 @@ impl Noise {
         if self.half_step > 0.0 || self.outliers.is_some() {
             return rows().map(log).sum();
         }
-        let at_bounds: f64 = rows().filter(|(_, kind)| **kind != Kind::Exact).map(log).sum();
-        at_bounds + self.exact_log_likelihood(&observed.uncensored(white))
+        let of_intervals: f64 = rows().filter(|(_, kind)| **kind != Kind::Exact).map(log).sum();
+        of_intervals + self.exact_log_likelihood(&observed.uncensored(white))
     }
 
     /// Returns the log-likelihood of innovations, in V, of readings that are not known up to an interval only, without outliers, in

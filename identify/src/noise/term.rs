@@ -1,7 +1,7 @@
 //! The contribution of one reading to the likelihood and to the normal equations of a fit.
 //!
 //! A rounded reading contributes the probability of its quantisation cell, a reading that stopped at a bound the tail
-//! probability beyond that bound (a censored observation).
+//! probability beyond that bound, one that is known up to an interval the probability of that interval (censored observations).
 
 /// `ln(2 pi) / 2`, the constant of the normal log-density.
 pub(super) const HALF_LN_TAU: f64 = 0.918_938_533_204_672_7;

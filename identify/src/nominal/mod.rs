@@ -36,6 +36,7 @@ use crate::nominal::plant::VoltageRange;
 use crate::nominal::report::{AtBound, FarReading, InputLaw, ZeroShift};
 use crate::nominal::usable::check;
 use crate::record::bounds::Bounds;
+use crate::record::held::without_held;
 use crate::record::input::Input;
 
 /// Largest held-out error under the square of a voltage of one sign, relative to that under the voltage, with which it is the law.
@@ -43,8 +44,9 @@ const MOST_OF_SQUARE: f64 = 0.5;
 /// Most searches for the best model without the readings that were far from the one before.
 const MOST_SEARCHES: usize = 3;
 
-/// Identifies the spring of one or several records; each has its own zero and start. Readings that stopped at a bound of the sensor, and
-/// those that are far from all around them, are left out; shifts of a zero within a record are fitted with the spring.
+/// Identifies the spring of one or several records; each has its own zero and start. Readings that repeat the one before because no new one was taken or sent,
+/// those that stopped at a bound of the sensor, and those that are far from all around them, are left out; shifts of a zero within a
+/// record are fitted with the spring.
 ///
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
@@ -55,7 +57,8 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     for record in records {
         check(record)?;
     }
-    let (mut kept, stopped) = without_stopped(records);
+    let new = without_held(records);
+    let (mut kept, stopped) = without_stopped(&new);
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();
     leave_out(&mut kept, far, &mut left_out);
@@ -85,6 +88,12 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         identified.linear = None;
         identified.report.remarks.insert(0, remarks::at_bounds(&stopped, units));
         identified.report.at_bound = stopped;
+    }
+    let readings =
+        |of: &[Record]| of.iter().flat_map(|record| &record.rows).filter(|row| row.measured.is_some()).count();
+    let held = readings(records) - readings(&new);
+    if held > 0 {
+        identified.report.remarks.insert(0, remarks::held(held));
     }
     Ok(identified)
 }

@@ -32,6 +32,14 @@ pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
     )
 }
 
+/// The remark on a number of readings that were held.
+pub(super) fn held(readings: usize) -> String {
+    format!(
+        "{readings} readings repeat the one before, to the last digit, because no new one was taken or sent; they are left out of the model and \
+         of its errors; `vsj diagnose` says what holds them."
+    )
+}
+
 /// The remark on shifts of the sensor's zero.
 pub(super) fn zero_shifts(shifts: &[ZeroShift], units: &Units) -> String {
     let shown = |ZeroShift { from_s, by, .. }: &ZeroShift| {

@@ -102,6 +102,26 @@ fn readings_at_a_bound_of_the_sensor_are_left_out() {
     assert!(expected.at_bound.is_empty() && expected.rows == 600);
 }
 
+/// Each row in which no new reading came repeats the one before: half of them, by a linear congruential generator.
+#[test]
+fn readings_that_repeat_because_no_new_one_came_are_left_out() {
+    let mut lossy = record(600, 3000, 0.0, 1.0);
+    let (mut state, mut lost) = (1u32, 0);
+    for row in 1..lossy.rows.len() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if state >> 31 == 1 {
+            lossy.rows[row].measured = lossy.rows[row - 1].measured;
+            lost += 1;
+        }
+    }
+    let report = found(&[lossy]).report;
+    assert_eq!((report.rows, report.order), (600 - lost, 1), "{report:?}");
+    assert!(report.remarks[0].starts_with(&format!("{lost} readings repeat")), "{:?}", report.remarks);
+    let Nominal { gain, share, delay_s, .. } = &report.nominal;
+    assert!(gain.low < 0.5 && 0.5 < gain.high && share.low < 0.2 && 0.2 < share.high, "{report:?}");
+    assert!(delay_s.value == 0.0 && (report.noise.sigma - 1.0).abs() < 0.1, "{report:?}");
+}
+
 /// A model of higher order would follow the step with a slow time constant of its own.
 #[test]
 fn a_shift_of_the_zero_is_fitted_with_the_model_and_spoils_nothing() {

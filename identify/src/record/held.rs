@@ -9,6 +9,8 @@
 //! are independent of each other, a sensor that reports changes leaves few rows while the response changes and many while it rests. Such
 //! a sensor also reports changes of nearly one size after very different times.
 
+use std::borrow::Cow;
+
 use simulation::record::Record;
 
 use crate::record::quantisation_grid::QuantisationGrid;
@@ -73,6 +75,17 @@ impl Held {
     pub fn reported_change(&self) -> Option<f64> {
         (self.reason == Reason::ReportsChanges).then_some(self.changes[0])
     }
+}
+
+/// Returns records without their held readings, for models that take each reading for a new one.
+pub fn without_held(records: &[Record]) -> Cow<'_, [Record]> {
+    let mut kept = Cow::Borrowed(records);
+    for (index, record) in records.iter().enumerate() {
+        if let Some(held) = held(record) {
+            kept.to_mut()[index] = held.left_out(record);
+        }
+    }
+    kept
 }
 
 /// Returns what the held readings of a record show; `None` if it has none.

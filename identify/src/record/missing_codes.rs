@@ -21,8 +21,8 @@ pub(super) struct Cells {
     pub(super) wider: Vec<Option<(f64, f64)>>,
 }
 
-/// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing, or nearly every reading is next to one. If some are, any other code between
-/// two given ones that no reading shows counts as missing, too.
+/// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing, or nearly every reading is next to
+/// one. If some are, any other code between two given ones that no reading shows counts as missing, too.
 pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cells> {
     let first = *reading.first()?;
     let codes: Vec<i64> = reading.iter().map(|reading| ((reading - first) / step).round() as i64).collect();

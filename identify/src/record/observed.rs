@@ -21,8 +21,11 @@ use crate::stats::thresholds::empirical::{COARSE, FINEST_V, LEAST_TRUNCATION};
 pub enum Kind {
     /// The reading is the true value with noise.
     Exact,
-    /// The true value with noise less the reading is between two values, in V (interval-censored).
+    /// A code next to the reading's is missing: the true value with noise less the reading is between two values, in V
+    /// (interval-censored).
     Within(f64, f64),
+    /// The sensor reports changes and reported none: the true value with noise is at most this far from the last reading, in V.
+    Unreported(f64),
     /// The reading stopped at the upper bound; the true value is at least that (right-censored).
     AtLeast,
     /// The reading stopped at the lower bound; the true value is at most that (left-censored).
@@ -32,7 +35,7 @@ pub enum Kind {
 impl Kind {
     /// True for a reading that is known up to an interval.
     fn is_interval(&self) -> bool {
-        matches!(self, Self::Within(..))
+        matches!(self, Self::Within(..) | Self::Unreported(_))
     }
 
     /// Returns the smallest error that explains a reading with a residual, both in V.
@@ -40,6 +43,7 @@ impl Kind {
         match self {
             Self::Exact => residual,
             Self::Within(low, high) => (residual + low).max(0.0) + (residual + high).min(0.0),
+            Self::Unreported(change) => residual - residual.clamp(-change, *change),
             Self::AtLeast => residual.max(0.0),
             Self::AtMost => residual.min(0.0),
         }
@@ -94,7 +98,7 @@ impl Observed {
             }
             let change = unreported(row);
             if change > 0.0 {
-                return Kind::Within(-change, change);
+                return Kind::Unreported(change);
             }
             let wider = cells.as_ref().and_then(|cells| cells.wider[row]);
             wider.map_or(Kind::Exact, |(low, high)| Kind::Within(low, high))
@@ -184,7 +188,7 @@ impl Observed {
     pub fn count_missing(&self, residual: &[f64]) -> usize {
         let half = self.grid.map_or(0.0, |grid| 0.5 * grid.step);
         let rows = residual.iter().zip(&self.kinds);
-        rows.filter(|(left, kind)| kind.is_interval() && left.abs() > half).count()
+        rows.filter(|(left, kind)| matches!(kind, Kind::Within(..)) && left.abs() > half).count()
     }
 
     /// Returns the smallest error of each row that explains its reading, in V: 0 for a reading at a bound when the

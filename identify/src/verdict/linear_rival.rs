@@ -29,7 +29,7 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
     if !judged || ours.len() != theirs.len() || ours.len() < SEGMENTS {
         return;
     }
-    // A reading at a bound of the sensor says little about either.
+    // A reading at a bound of the sensor, or known up to an interval, says little about either.
     let exact = |errors: &[f64]| -> Vec<f64> {
         let rows = errors.iter().zip(&diagnosis.observed.kinds);
         rows.map(|(error, kind)| if *kind == Kind::Exact { *error } else { 0.0 }).collect()

@@ -87,6 +87,7 @@ fn data(data: &mut Data, records: &[Record], normalisations: &[Normalisation]) {
     data.time_s = rows().map(|(row, shift_s, _)| row.time_s + shift_s).collect();
     data.voltage_v = rows().map(|(row, ..)| row.voltage_v).collect();
     data.reading = rows().map(|(.., reading)| reading).collect();
+    data.unreported_v.iter_mut().flatten().for_each(|change| *change *= scales.reading.abs());
     data.command = data.command.scaled(scales.second_s, scales.volt_v);
     data.full_scale_v *= scales.volt_v;
     data.largest_v *= scales.volt_v;
