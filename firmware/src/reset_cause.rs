@@ -104,9 +104,9 @@ pub enum Reset {
 pub struct Cause {
     /// Name of the reset's cause for the log.
     pub name: &'static str,
-    /// The fault behind it.
+    /// The fault that the previous run showed or that stopped it; without one, the fault that the reset is.
     pub fault: Option<Fault>,
-    /// That fault, and the earlier ones that nobody has acknowledged.
+    /// Both, and the earlier ones that nobody has acknowledged.
     pub standing: Faults,
 }
 
@@ -121,15 +121,17 @@ pub fn reset_cause(reset: Option<Reset>, record: CrashRecord) -> Cause {
         CrashRecord::Running | CrashRecord::Faulted(Fault::Watchdog, _) => Reset::Watchdog,
         CrashRecord::Restart | CrashRecord::Faulted(..) => Reset::Software,
     };
-    let (name, fault) = match (reset.unwrap_or(derived), record) {
+    let (name, of_reset) = match (reset.unwrap_or(derived), record) {
         (Reset::Supply, CrashRecord::None | CrashRecord::Restart) => ("power-on", None),
-        (Reset::Supply, _) => ("brown-out", recorded.or(Some(Fault::Supply))),
-        (Reset::Watchdog, _) => ("watchdog", recorded.or(Some(Fault::Watchdog))),
-        (Reset::Software, _) => ("software", recorded),
-        (Reset::Pin, _) => ("pin", recorded),
-        (Reset::Other, _) => ("other", recorded),
+        (Reset::Supply, _) => ("brown-out", Some(Fault::Supply)),
+        (Reset::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
+        (Reset::Software, _) => ("software", None),
+        (Reset::Pin, _) => ("pin", None),
+        (Reset::Other, _) => ("other", None),
     };
-    Cause { name, fault, standing: fault.map_or(stood, |fault| stood.with(fault)) }
+    // A fault that stood already does not hide the one that the reset is.
+    let standing = [recorded, of_reset].into_iter().flatten().fold(stood, Faults::with);
+    Cause { name, fault: recorded.or(of_reset), standing }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use super::*;
 
 #[test]
-fn a_fault_survives_every_reset_and_a_supply_dip_is_a_fault() {
+fn a_fault_survives_every_reset_and_stands_beside_a_dip_of_the_supply_or_the_watchdog() {
     let both = Faults::NONE.with(Fault::Panic).with(Fault::Interlock);
     let panic = CrashRecord::Faulted(Fault::Panic, both);
     for (reset, record, name, fault) in [
@@ -16,7 +16,12 @@ fn a_fault_survives_every_reset_and_a_supply_dip_is_a_fault() {
         (Reset::Pin, panic, "pin", Some(Fault::Panic)),
         (Reset::Other, panic, "other", Some(Fault::Panic)),
     ] {
-        let standing = if record == panic { both } else { fault.map_or(Faults::NONE, |it| Faults::NONE.with(it)) };
+        let stood = if record == panic { both } else { fault.map_or(Faults::NONE, |it| Faults::NONE.with(it)) };
+        let standing = match reset {
+            Reset::Supply if record != CrashRecord::None => stood.with(Fault::Supply),
+            Reset::Watchdog => stood.with(Fault::Watchdog),
+            _ => stood,
+        };
         assert_eq!(reset_cause(Some(reset), record), Cause { name, fault, standing }, "{reset:?} {record:?}");
     }
 }
