@@ -63,6 +63,9 @@ pub struct Client {
 /// Requests after which a client begins a new session: a session has 65 536 numbers.
 const MOST_REQUESTS: u16 = 60_000;
 
+/// Reports that are confirmed after one request, at most.
+const MOST_HEARD: usize = 16;
+
 /// An answer of the MCU.
 struct Answer {
     sequence: Sequence,
@@ -146,7 +149,11 @@ impl Client {
     /// Restarts the MCU and asks it for a new session. The MCU then numbers its reports of faults from 1 again, so that those received
     /// before are not confirmed to it any more.
     pub(crate) fn restart(&mut self) -> Result<(), Failure> {
-        self.order(Request::Restart)?;
+        match self.order(Request::Restart) {
+            // The second: its answer was lost, so that the request came again, to an MCU that has restarted.
+            Ok(_) | Err(Failure::Refused(Reason::HelloFirst)) => {}
+            Err(failure) => return Err(failure),
+        }
         self.begin()?;
         self.unheard.clear();
         Ok(())
@@ -169,10 +176,12 @@ impl Client {
             }
         }
         let reply = self.exchange(request);
-        let restarts = request == Request::Restart && reply.is_ok();
+        let restarts =
+            request == Request::Restart && matches!(reply, Ok(_) | Err(Failure::Refused(Reason::HelloFirst)));
         if !restarts && matches!(reply, Ok(_) | Err(Failure::Refused(_))) {
-            // One that arrives meanwhile is for the next request.
-            for number in self.unheard.iter().map(|report| report.number).collect::<Vec<_>>() {
+            // Those that arrive meanwhile as well: this request may be the program's last.
+            for _ in 0..MOST_HEARD {
+                let Some(number) = self.unheard.first().map(|report| report.number) else { break };
                 let heard = self.exchange(Request::Heard { number });
                 // Only now: until then the MCU may have repeated it.
                 self.unheard.retain(|report| report.number != number);
