@@ -61,6 +61,8 @@ pub struct View {
     pub(super) adaptation: Option<AdaptationReport>,
     /// Standing faults, as last reported, besides the one that the status shows.
     reported: Vec<Fault>,
+    /// Tick of the MCU in which the last of them was seen.
+    reported_tick: u64,
     pub(super) note: Option<Note>,
     /// The target that is being typed.
     pub(super) prompt: Option<String>,
@@ -88,6 +90,7 @@ impl View {
             isolation: None,
             adaptation: None,
             reported: Vec::new(),
+            reported_tick: 0,
             note: None,
             prompt: None,
             shows_help: false,
@@ -110,6 +113,8 @@ impl View {
                 }
                 self.connection = Connection::Connected;
                 (self.isolation, self.adaptation) = (None, None);
+                // The ticks of a restarted MCU begin anew.
+                self.reported_tick = 0;
                 self.arrivals.clear();
                 self.take_status(status);
             }
@@ -129,7 +134,9 @@ impl View {
             }
             Event::Isolation(report) => self.isolation = Some(report),
             Event::Adaptation(report) => self.adaptation = Some(report),
-            Event::Faults(report) => self.reported = report.faults().collect(),
+            Event::Faults(report) => {
+                (self.reported, self.reported_tick) = (report.faults().collect(), report.tick);
+            }
             Event::Done(text) => self.note(&text, false),
             Event::Failed(text) => self.note(&text, true),
             Event::Playing(playing) => self.playing = playing,
@@ -142,7 +149,11 @@ impl View {
     }
 
     fn take_status(&mut self, status: Status) {
-        self.status = status;
+        let before = std::mem::replace(&mut self.status, status).fault;
+        if before != status.fault {
+            // It was acknowledged, or another one would not be shown.
+            self.reported.retain(|fault| *fault != before);
+        }
         self.take_sample(status.sample);
     }
 
@@ -151,7 +162,8 @@ impl View {
         if !self.is_armed() {
             self.ordered_v = None;
         }
-        if sample.state != State::Faulted {
+        // A report goes ahead of samples that were taken before.
+        if sample.state != State::Faulted && sample.tick > self.reported_tick {
             self.reported.clear();
         }
     }
@@ -241,8 +253,26 @@ mod tests {
         view.on_event(Event::Faults(FaultReport { fault: Fault(5), standing: 0b1_1000, ..FaultReport::default() }));
         assert_eq!((view.fault(), view.other_faults().collect::<Vec<_>>()), (Some(Fault(4)), vec![Fault(5)]));
         view.on_event(Event::Status(Status { fault: Fault(5), ..view.status }));
-        assert_eq!((view.fault(), view.other_faults().count()), (Some(Fault(5)), 1), "the report is from before");
+        assert_eq!((view.fault(), view.other_faults().count()), (Some(Fault(5)), 0), "the first was acknowledged");
         view.on_event(Event::Status(Status { fault: Fault::NONE, sample: Telemetry::default(), ..view.status }));
         assert_eq!((view.fault(), view.other_faults().count()), (None, 0));
+    }
+
+    #[test]
+    fn a_sample_from_before_a_report_does_not_hide_what_stands() {
+        let mut view = view();
+        let (armed, both) = (Telemetry { tick: 9, state: State::Armed, ..Telemetry::default() }, 0b1_1000);
+        view.on_event(Event::Faults(FaultReport {
+            fault: Fault(5),
+            tick: 10,
+            standing: both,
+            ..FaultReport::default()
+        }));
+        view.on_event(Event::Samples { host_s: 0.0, samples: vec![armed] });
+        let sample = Telemetry { tick: 10, state: State::Faulted, ..armed };
+        view.on_event(Event::Status(Status { fault: Fault(4), sample, ..view.status }));
+        assert_eq!(view.other_faults().collect::<Vec<_>>(), [Fault(5)]);
+        view.on_event(Event::Samples { host_s: 0.1, samples: vec![Telemetry { tick: 11, ..armed }] });
+        assert_eq!(view.other_faults().count(), 0);
     }
 }

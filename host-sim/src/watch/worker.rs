@@ -116,13 +116,13 @@ impl<'a> Worker<'a> {
     pub fn run(mut self, client: Client) -> Outcome {
         let mut connected = Some(client);
         while let Some(mut client) = connected {
-            let failure = match self.stay(&mut client) {
-                Ok(()) => {
-                    self.disarm_at_end(&mut client);
-                    break;
-                }
-                Err(failure) => failure,
-            };
+            let stayed = self.stay(&mut client);
+            if stayed.is_ok() {
+                self.disarm_at_end(&mut client);
+            }
+            // The MCU repeats none that this program has confirmed.
+            self.tell_faults(&mut client);
+            let Err(failure) = stayed else { break };
             // The port of a lost connection would still be locked.
             drop(client);
             self.stop_playing();
@@ -173,9 +173,7 @@ impl<'a> Worker<'a> {
                 self.state = client.order(Request::Heartbeat)?.0;
                 heard = Instant::now();
             }
-            for report in client.reports() {
-                self.say(Event::Faults(report));
-            }
+            self.tell_faults(client);
             self.collect(client)?;
             if shown.elapsed() >= PROGRESS {
                 self.tell_progress();
@@ -233,6 +231,10 @@ impl<'a> Worker<'a> {
         }
         self.say(Event::Samples { host_s: self.begin.elapsed().as_secs_f64(), samples });
         Ok(())
+    }
+
+    fn tell_faults(&self, client: &mut Client) {
+        client.reports().into_iter().for_each(|report| self.say(Event::Faults(report)));
     }
 
     fn tell_progress(&self) {
