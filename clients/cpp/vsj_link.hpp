@@ -261,6 +261,31 @@ struct Sample {
     }
 };
 
+/// A fault that the microcontroller has reported.
+struct Fault {
+    /// Number of the report since the start, and the tick in which the fault was seen, with its time in s.
+    std::uint32_t number = 0;
+    std::uint64_t tick = 0;
+    double time_s = 0;
+    /// Its code, for `fault_name` and `Link::acknowledge`.
+    std::uint8_t code = 0;
+    /// All faults that stood when the report was sent: bit 0 for code 1.
+    std::uint16_t standing = 0;
+    /// What disagreed with the output: a code of docs/link.md.
+    std::uint8_t mismatch = 0;
+
+    static Fault read(wire::Reader& from, std::uint32_t rate_hz) {
+        Fault fault;
+        fault.number = static_cast<std::uint32_t>(from.number());
+        fault.tick = from.number();
+        fault.time_s = static_cast<double>(fault.tick) / std::max(rate_hz, 1u);
+        fault.code = from.byte();
+        fault.standing = static_cast<std::uint16_t>(from.number());
+        fault.mismatch = from.byte();
+        return fault;
+    }
+};
+
 /// What the isolation bank says of the spring and its sensor; it comes with the telemetry.
 struct Isolation {
     /// Number of the tick, and the one after which the fault has been there, 0 without an alarm; counted from the start.
@@ -559,6 +584,12 @@ public:
     /// Acknowledges a fault by its code; after the last one the microcontroller is disarmed.
     State acknowledge(std::uint8_t fault) { return order({5, fault}).first; }
 
+    /// The faults that the microcontroller has reported since the last call, in their order; each is reported once.
+    std::vector<Fault> faults() {
+        const Lock lock(mutex_);
+        return std::exchange(reported_, {});
+    }
+
     /// The model that runs, and the one stored for the next start. `vsj link PORT model` sends another one.
     Blocks model() { return blocks(8, 4); }
 
@@ -663,6 +694,7 @@ private:
     std::optional<Isolation> isolation_;
     /// Numbers of the reports of faults whose receipt the microcontroller does not know of yet.
     std::set<std::uint32_t> unheard_;
+    std::vector<Fault> reported_;
     Clock::duration beat_{};
     Clock::time_point heard_ = Clock::now();
     std::mutex closing_lock_;
@@ -788,7 +820,8 @@ private:
                     const Sample sample = Sample::read(from, status_.rate_hz);
                     if (from.is_whole()) samples_.push_back(sample);
                 } else if (code == 5) {
-                    unheard_.insert(static_cast<std::uint32_t>(from.number()));
+                    const Fault fault = Fault::read(from, status_.rate_hz);
+                    if (from.is_whole() && unheard_.insert(fault.number).second) reported_.push_back(fault);
                 } else {
                     return packet;
                 }

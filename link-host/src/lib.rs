@@ -20,4 +20,4 @@ pub use client::{Client, Patience, heartbeat};
 pub use command::{desired, fault, refusal};
 pub use failure::Failure;
 pub use port::Port;
-pub use report::{AdaptationRow, IsolationRow, Row, StatusReport};
+pub use report::{AdaptationRow, FaultRow, IsolationRow, Row, StatusReport};

@@ -2,7 +2,7 @@
 
 use link::isolation::Off;
 use link::session::Counters;
-use link::{AdaptationReport, IsolationReport, Status, Telemetry};
+use link::{AdaptationReport, FaultReport, IsolationReport, Status, Telemetry};
 use model::Limits;
 use model::isolation::Cause;
 use serde::Serialize;
@@ -33,6 +33,37 @@ pub struct Row {
     pub monitors: &'static str,
     /// Diagnosis of the stiffness sensor: `none` without one, `trusted`, or its fault.
     pub sensor: &'static str,
+}
+
+/// A fault that the MCU has reported.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FaultRow {
+    /// Time since the MCU started, in s.
+    pub time_s: f64,
+    /// Number of the tick in which the fault was seen.
+    pub tick: u64,
+    /// Its name.
+    pub fault: &'static str,
+    /// Its stable number.
+    pub fault_code: u8,
+    /// Names of all faults that stood when the report was sent.
+    pub standing: Vec<&'static str>,
+    /// What disagreed with the output: `none`, `limit`, `open`, `short`, `leakage`, `reference` or `held`.
+    pub monitors: &'static str,
+}
+
+impl FaultRow {
+    /// Converts a report of an MCU with `rate_hz` ticks per second.
+    pub fn new(report: &FaultReport, rate_hz: u32) -> Self {
+        Self {
+            time_s: report.tick as f64 / f64::from(rate_hz.max(1)),
+            tick: report.tick,
+            fault: report.fault.name(),
+            fault_code: report.fault.0,
+            standing: report.faults().map(link::Fault::name).collect(),
+            monitors: report.mismatch.name(),
+        }
+    }
 }
 
 /// What the isolation bank of the MCU says, with the fields of `vsj isolate`; times are those since the MCU started.

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
-use link_host::{Client, Failure, IsolationRow, Patience, Row, StatusReport, heartbeat};
+use link_host::{Client, Failure, FaultRow, IsolationRow, Patience, Row, StatusReport, heartbeat};
 use pyo3::prelude::*;
 use serde_json::json;
 use simulation::settings_file::{SettingsFile, Source};
@@ -48,10 +48,18 @@ impl Connection {
         self.client.name().to_owned()
     }
 
+    /// Reads the status of an MCU whose settings may have changed, and with it the time between heartbeats.
+    fn learn(&mut self) -> Result<()> {
+        let name = self.name();
+        self.status = self.client.status().with_context(|| name)?;
+        self.heartbeat = heartbeat(&self.status);
+        Ok(())
+    }
+
     /// Reads the status, which also holds after a restart.
     fn status(&mut self) -> Result<String> {
+        self.learn()?;
         let name = self.name();
-        self.status = self.client.status().with_context(|| name.clone())?;
         let isolation = self.client.isolation(Isolation::Read).with_context(|| name.clone())?;
         let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| name)?;
         self.heard = Instant::now();
@@ -76,7 +84,7 @@ impl Connection {
     }
 
     fn settings(&mut self, path: Option<PathBuf>) -> Result<(String, String)> {
-        let name = self.name();
+        let (name, path_is_given) = (self.name(), path.is_some());
         let blocks = match &path {
             None => self.client.settings(),
             Some(path) => {
@@ -92,6 +100,9 @@ impl Connection {
             blocks => blocks.with_context(|| name.clone())?,
         };
         let running = self.client.read_settings(false).with_context(|| name)?;
+        if path_is_given {
+            self.learn()?;
+        }
         Ok((serde_json::to_string(&blocks)?, SettingsFile::from(&running).to_toml()?))
     }
 }
@@ -209,6 +220,15 @@ impl Port {
                 row
             };
             Ok(serde_json::to_string(&samples.iter().map(row).collect::<Vec<_>>())?)
+        })
+    }
+
+    /// The faults that the MCU has reported since the last call, as a JSON array.
+    fn faults(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |it| {
+            let rows: Vec<_> =
+                it.client.reports().iter().map(|report| FaultRow::new(report, it.status.rate_hz)).collect();
+            Ok(serde_json::to_string(&rows)?)
         })
     }
 

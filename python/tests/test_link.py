@@ -46,6 +46,7 @@ def test_the_link_arms_sets_watches_and_disarms(board):
         # Up to half a period is jitter, not a loss.
         assert all(10 < after.tick - before.tick < 30 for before, after in zip(samples, samples[1:]))
         assert samples[-1].target_v == 300.0 and samples[-1].applied_v > 300
+        assert link.faults() == []
     with vsj.Link(board, timeout=5) as link:
         assert link.status()["sample"]["state"] == "disarmed"
         with pytest.raises(vsj.LinkError, match="refused: not armed"):

@@ -176,6 +176,17 @@ class Link:
         """Acknowledge a fault by its name or number. Returns the state."""
         return self._port.acknowledge(str(fault))[0]
 
+    def faults(self) -> List[Dict[str, Any]]:
+        """The faults that the MCU has reported since the last call, in their order; each is reported once.
+
+        Returns
+        -------
+        list of dict
+            ``time_s`` and ``tick`` since the MCU's start, ``fault`` and ``fault_code``, ``standing`` (the names of all faults that
+            stood then), and ``monitors`` (what disagreed with the output, ``"none"`` if nothing did).
+        """
+        return json.loads(self._port.faults())
+
     def watch(self, rate_hz: float = 100.0, seconds: Optional[float] = None) -> Iterator[Sample]:
         """Iterate over samples as they arrive, until ``seconds`` have passed or the loop is left.
 

@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
             // Up to half a period is jitter, not a loss.
             expect(samples[at].tick <= samples[at - 1].tick + 30, "no sample lost");
         expect(samples.back().target_v == 300.0 && samples.back().applied_v > 300.0, "an overshooting voltage");
+        expect(link.faults().empty(), "no fault");
         expect(contains(error_of([&] { link.set(5000); }), "out of range: expected 0 to 700"), "a bound");
         expect(link.model().active.number == 0 && link.settings().active.number == 0, "what is built in");
         expect(contains(error_of([&] { link.record(file, -1, patience); }), "expected 0.02 to 10000"), "a rate refused");

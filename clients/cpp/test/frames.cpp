@@ -64,6 +64,15 @@ int check(const std::string& path, std::uint8_t kind) {
             expect(from.is_whole() && sample.time_s == 70.0 && sample.applied_v == -1.0 / 1048576 && sample.sensor == 4,
                    "another sample: " + line);
         }
+        if (kind == vsj::wire::reply_kind && message.substr(0, 2) == "05") {
+            const vsj::Bytes content = bytes(message);
+            vsj::wire::Reader from(content);
+            from.byte();
+            const auto fault = vsj::Fault::read(from, 1000);
+            expect(from.is_whole() && fault.number == 300 && fault.time_s == 70.0 && fault.code == 6 &&
+                       fault.standing == 0x24 && fault.mismatch == 3,
+                   "another fault: " + line);
+        }
         if (kind == vsj::wire::notice_kind) {
             const vsj::Bytes content = bytes(message);
             vsj::wire::Reader from(content);
