@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use crate::linear::problem::{Fit, Poles, Problem};
 use crate::linear::section::Section;
 use crate::linear::series::Series;
-use crate::stats::median::median;
 use crate::stats::periodogram::powers;
 
 /// Largest order of a model.
@@ -31,6 +30,8 @@ const MOST_DELAY_JUMPS: usize = 6;
 /// Most steps on all rows of a record of which only a part was searched, and the relative reduction of the cost below which they
 /// end.
 const STEPS_ON_ALL: (usize, f64) = (4, 1e-5);
+/// Most places of readings in the spectrum of a residual.
+const MOST_PLACES: f64 = 100_000.0;
 /// Spectral lines of the residual at which a pair of poles is tried.
 const PEAKS: usize = 4;
 /// Relative reduction of the cost below which a refinement ends: of a quick one, of one on part of the rows, and of the last one.
@@ -207,8 +208,8 @@ fn peaks(problem: &Problem, residual: &[f64]) -> Vec<(f64, f64)> {
     else {
         return Vec::new();
     };
-    let mut gaps: Vec<f64> = series.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let Some(step) = median(&mut gaps) else { return Vec::new() };
+    // Of a part of the rows the distances vary.
+    let step = series.spacing.max(series.duration() / MOST_PLACES);
     let place = |time: f64| ((time - series.time[0]) / step).round() as usize;
     let mut placed = vec![0.0; place(series.time[series.rows() - 1]) + 1];
     series.time.iter().zip(&residual[first..]).for_each(|(&time, error)| placed[place(time)] = *error);

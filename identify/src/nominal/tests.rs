@@ -102,6 +102,27 @@ fn readings_at_a_bound_of_the_sensor_are_left_out() {
     assert!(expected.at_bound.is_empty() && expected.rows == 600);
 }
 
+/// A part of the rows is searched: levels of a round number of rows would give it readings at the same times after each step only.
+#[test]
+fn a_delay_is_found_in_more_rows_than_are_searched_under_levels_of_equal_length() {
+    const DELAY: usize = 3;
+    let (rows, noise) = (6000, normals(6000));
+    let level = |row: usize| 10.0 * ((row / 150 * 7) % 11) as f64;
+    let mut lag = 0.0;
+    let row = |row: usize| {
+        let late_v = if row < DELAY { 0.0 } else { level(row - DELAY) };
+        let reading = 0.1 * late_v + 0.9 * lag + 0.2 * noise[row];
+        lag = late_v + (lag - late_v) * f64::exp(-1.0 / 30.0);
+        Row { line: 0, time_s: 0.001 * row as f64, voltage_v: level(row), measured: Some(reading) }
+    };
+    let record = Record { name: "late".into(), rows: (0..rows).map(row).collect() };
+    let report = found(&[record]).report;
+    let Nominal { share, delay_s, .. } = &report.nominal;
+    assert!(report.order == 1 && report.undriven_order == 0, "{report:?}");
+    assert!(share.low < 0.1 && 0.1 < share.high && (delay_s.high - 0.003).abs() < 1e-9, "{report:?}");
+    assert!(report.linear.iter().all(|of| of.held_out_rmse < 0.21), "{report:?}");
+}
+
 /// Each row in which no new reading came repeats the one before: half of them, by a linear congruential generator.
 #[test]
 fn readings_that_repeat_because_no_new_one_came_are_left_out() {
