@@ -24,6 +24,8 @@ const SMALLEST: f64 = 0.05;
 const THRESHOLD: f64 = 0.3;
 /// Part of the changes that turn back, from which readings are noise and not a smooth curve; of white noise two thirds do.
 const TURNING: f64 = 0.2;
+/// Size of the changes after held readings, relative to that of the others, from which they catch up.
+const CATCHING_UP: f64 = 0.8;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
 const CLOCK: f64 = 0.3;
 /// Largest scatter of the sizes of changes, relative to that of their rates, where changes of one size are reported.
@@ -102,7 +104,8 @@ pub fn held(record: &Record) -> Option<Held> {
     let changing: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || is_special(reading(row))).collect();
     let values: Vec<f64> = changing.iter().map(|&row| reading(row)).collect();
     let too_few = (rows.len() - changing.len()) < (LEAST_HELD.get() * rows.len() as f64) as usize;
-    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, equal) {
+    let changes_after = |held: bool| changes_at_rest(record, &rows, &changing, held);
+    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, equal, [true, false].map(changes_after)) {
         return None;
     }
     // A held reading may be the highest one, but a bound is reached again and again.
@@ -141,8 +144,18 @@ pub fn held(record: &Record) -> Option<Held> {
     })
 }
 
-/// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between.
-fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool) -> bool {
+/// Returns the sizes of the changes between new readings under a voltage that rests, those after held readings or those without any.
+fn changes_at_rest(record: &Record, rows: &[(usize, f64, f64)], new: &[usize], held: bool) -> Vec<f64> {
+    let voltage = |row: usize| record.rows[rows[row].0].voltage_v;
+    let rests = |pair: &[usize]| (pair[0]..pair[1]).all(|row| voltage(row) == voltage(row + 1));
+    let wanted = new.windows(2).filter(|pair| (pair[1] - pair[0] > 1) == held && rests(pair));
+    wanted.map(|pair| (rows[pair[1]].2 - rows[pair[0]].2).abs()).collect()
+}
+
+/// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between. They
+/// are noise or changes of a least size, or those after held readings, the first of the given changes at rest, catch up: a rounded
+/// response repeats where it hardly changes, and then changes least.
+fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool, [after_held, others]: [Vec<f64>; 2]) -> bool {
     let changes = changes(new);
     let [smallest, middle] = [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]];
     let returns = new.windows(3).filter(|of| equal(of[2], of[0]) && !equal(of[1], of[0])).count();
@@ -152,9 +165,11 @@ fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool) -> bool {
     distinct.sort_by(f64::total_cmp);
     distinct.dedup_by(|a, b| equal(*a, *b));
     let grid = QuantisationGrid::of(&distinct).map_or(0.0, |grid| grid.step);
+    let [held, direct] = [&after_held, &others].map(|changes| median(&mut changes.clone()).unwrap_or(0.0));
+    let catches_up = after_held.len() >= FEWEST_NEW && held > CATCHING_UP * direct;
     part(returns) < MOST_RETURNS.get()
         && grid < COARSEST_GRID_OF_HELD.get() * middle
-        && (part(turns) > TURNING || smallest > THRESHOLD * middle)
+        && (part(turns) > TURNING || smallest > THRESHOLD * middle || catches_up)
 }
 
 /// Returns the sizes of all changes, in ascending order.
@@ -171,7 +186,9 @@ fn changes(new: &[f64]) -> Vec<f64> {
 /// they are clipped, so that a few long rests do not hide that. They also do if all changes are nearly of one size, while their rates
 /// are not.
 fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason {
-    let lengths: Vec<f64> = new.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    // Equal ones are readings at a bound or of a spring at rest.
+    let changed = new.windows(2).filter(|pair| rows[pair[0]].2 != rows[pair[1]].2);
+    let lengths: Vec<f64> = changed.map(|pair| (pair[1] - pair[0]) as f64).collect();
     let steps = new.windows(2).map(|pair| (rows[pair[0]], rows[pair[1]])).filter(|(from, to)| from.2 != to.2);
     let (sizes, rates): (Vec<f64>, Vec<f64>) = steps
         .map(|((_, from_s, from), (_, to_s, to))| ((to - from).abs().ln(), ((to - from).abs() / (to_s - from_s)).ln()))
@@ -208,12 +225,17 @@ mod tests {
     /// A record of steps of 100 V with noise of 1 V and a time constant of 30 rows, read as `read` says: from the reading before, the
     /// new one and a random number from 0 to 1.
     fn record(read: impl Fn(f64, f64, f64) -> f64) -> Record {
+        record_with(1.0, read)
+    }
+
+    /// The same with another noise, in V.
+    fn record_with(noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
         let (mut state, mut before, mut random) = (0.0, 0.0, 1u32);
         let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
             let voltage_v = 100.0 * (row / 200 % 4) as f64;
             state += (voltage_v - state) / 30.0;
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            before = read(before, state + noise, f64::from(random >> 8) / f64::from(1 << 24));
+            before = read(before, state + noise_v * noise, f64::from(random >> 8) / f64::from(1 << 24));
             Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(before) }
         });
         Record { name: String::new(), rows: rows.collect() }
@@ -234,6 +256,23 @@ mod tests {
         let mut slow = record(|_, new, _| new);
         (0..ROWS).filter(|row| row % 3 > 0).for_each(|row| slow.rows[row].measured = slow.rows[row - 1].measured);
         assert_eq!(held(&slow).unwrap().reason, Reason::SlowClock);
+    }
+
+    /// Most readings of a good sensor do not turn. Those that were rounded, or have settled, repeat as well, and catch up with nothing.
+    #[test]
+    fn readings_of_a_good_sensor_that_were_lost_or_taken_at_a_slow_clock_are_held() {
+        for noise_v in [0.0, 0.02, 0.1, 0.3] {
+            let all = record_with(noise_v, |before, new, random| if random < 0.4 { before } else { new });
+            let lost = held(&all).unwrap();
+            assert!(lost.reason == Reason::Lost && (lost.fraction - 0.4).abs() < 0.05, "{noise_v}: {lost:?}");
+            let mut slow = record_with(noise_v, |_, new, _| new);
+            (0..ROWS).filter(|row| row % 5 > 0).for_each(|row| slow.rows[row].measured = slow.rows[row - 1].measured);
+            assert_eq!(held(&slow).map(|held| held.reason), Some(Reason::SlowClock), "{noise_v}");
+            for step in [0.01, 0.1, 0.5, 2.0] {
+                let rounded = record_with(noise_v, |_, new, _| (new / step).round() * step);
+                assert_eq!(held(&rounded), None, "{noise_v} {step}");
+            }
+        }
     }
 
     /// The noise decides when the response reports a change, so that the numbers of rows are independent.
