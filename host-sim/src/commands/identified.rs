@@ -12,6 +12,8 @@ use super::spring_error::{ErrorOf, together};
 
 /// Largest error of a parameter, relative.
 const LARGEST: f64 = 0.9;
+/// Instantaneous share that no step shows, relative to the static gain.
+const NEGLIGIBLE: f64 = 0.01;
 /// Largest size of an identification, in MiB.
 const MOST_MIB: usize = 16;
 
@@ -40,6 +42,12 @@ impl Interval {
     fn relative(&self) -> f64 {
         0.5 * (self.high - self.low) / self.value.abs()
     }
+
+    /// The same of an instantaneous share. One that is known to be next to nothing is known well, whatever its relative error.
+    fn relative_of_share(&self) -> f64 {
+        let is_negligible = self.low.abs().max(self.high.abs()) < NEGLIGIBLE;
+        if is_negligible { self.relative().min(LARGEST) } else { self.relative() }
+    }
 }
 
 /// The intervals of an identification as errors.
@@ -50,7 +58,7 @@ fn of_identification(path: &Path) -> Result<SpringError> {
         Err(error) => bad_input!("{}: {error}; expected the JSON of `vsj identify`", path.display()),
     };
     Ok(SpringError {
-        share: nominal.share.relative(),
+        share: nominal.share.relative_of_share(),
         time_constant: nominal.tau_s.iter().map(Interval::relative).fold(0.0, f64::max),
         gain: nominal.gain.relative(),
     })

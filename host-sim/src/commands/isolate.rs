@@ -74,6 +74,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         bad_input!("--noise-correlation-s: expected --noise-v as well; only white noise is found from the readings");
     }
     let noise_v = match arguments.noise_v.or_else(|| noise_v(&record)) {
+        Some(0.0) if arguments.noise_v.is_none() => bad_input!(
+            "{}: most readings repeat the one before, which shows no noise; expected new readings, or --noise-v",
+            record.name
+        ),
         Some(noise_v) => noise_v,
         None => bad_input!("{}: fewer than 10 readings; expected more, or --noise-v", record.name),
     };

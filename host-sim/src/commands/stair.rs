@@ -76,19 +76,21 @@ impl Arguments {
 
     /// The experiment on a plant file's spring.
     fn request<'a>(&self, options: Options, plant: &'a PlantFile, target: Target<'a>) -> Request<'a> {
-        // The loop without a controller is run beside one with the report's.
-        let compared = match options.controller {
-            Controller::None => Controller::Paper,
-            controller => controller,
-        };
-        Request {
+        let with = |controller| Request {
             plant,
             paper: self.control.plant == "paper",
             target,
-            compensation: Options { controller: compared, ..options }.compensation(),
+            compensation: Options { controller, ..options }.compensation(),
             controlled: options.controller != Controller::None,
             amplifier: options.amplifier(),
             rate_hz: options.rate_hz,
+        };
+        match options.controller {
+            // The loop without a controller is run beside one with the report's, whose gain may be too large for a quick spring.
+            Controller::None => Some(with(Controller::Paper))
+                .filter(|request| request.check().is_ok())
+                .unwrap_or_else(|| with(Controller::None)),
+            controller => with(controller),
         }
     }
 

@@ -215,7 +215,8 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
     let mut sentences: Vec<String> = unfinished.chain(parts_to_take_out(report, scales)).collect();
     sentences.push(match report.verdict {
         Verdict::Explained if causes.is_empty() => {
-            format!("Without that, the simulation agrees with {name} within the noise of {rows} readings.")
+            let with = if report.take_out.is_empty() { "With what single records show" } else { "Without that" };
+            format!("{with}, the simulation agrees with {name} within the noise of {rows} readings.")
         }
         Verdict::Consistent => {
             let what = if report.leftover.is_none() {
