@@ -32,6 +32,9 @@ pub struct Options {
     pub simpler: Option<Base>,
     /// Root mean square error of the identified spring on held-out segments, in the reading's unit; `None` if it was not identified.
     pub held_out_rmse: Option<f64>,
+    /// True if so few readings were identified that no model with a time constant was tried: that the simulation agrees with them says
+    /// nothing.
+    pub without_dynamics: bool,
     /// How long causes are searched for.
     pub effort: Effort,
     /// The best linear model of the records, if it is known; it is fitted otherwise.
@@ -55,9 +58,10 @@ impl Options {
     /// Those of [`Base::new`].
     pub fn judging(self, identified: Identified) -> Result<Self> {
         let Identified { report, plant, simpler, settled, decays, linear, .. } = identified;
-        let held_out_rmse = Some(report.held_out_rmse);
+        let (held_out_rmse, without_dynamics) = (Some(report.held_out_rmse), report.linear.is_empty());
         let simpler = simpler.map(Base::new).transpose()?;
-        Self { unsettled: !settled, identified: true, decays, simpler, held_out_rmse, linear, ..self }
+        let unsettled = !settled;
+        Self { unsettled, identified: true, decays, simpler, held_out_rmse, without_dynamics, linear, ..self }
             .judging_file("identify", plant)
     }
 
@@ -92,6 +96,7 @@ impl Default for Options {
             decays: false,
             simpler: None,
             held_out_rmse: None,
+            without_dynamics: false,
             effort: Effort::Normal,
             linear: None,
             stop: Stop::default(),

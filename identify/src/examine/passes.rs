@@ -38,6 +38,7 @@ use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
+use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::{self, Diagnosis};
 use crate::verdict::held_findings::add_held;
@@ -67,6 +68,10 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let judge = linear.as_ref().filter(|_| is_judged_by_linear(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
+    if options.without_dynamics && found.report.verdict == Verdict::Consistent {
+        found.report.verdict = Verdict::Insufficient;
+        found.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
+    }
     hypothesise(&mut found, &records[0], options, judge);
     if let Some(held) = &held {
         add_held(&mut found.report, held, &options.units);

@@ -72,11 +72,10 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     spring.unmodelled = None;
     let plant = "the spring with the shared causes".to_owned();
     let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
-    // What all sensors do is shown by the longest record.
-    let shared_held = || held.iter().flatten().max_by_key(|held| held.rows.len());
-    if let Some(shared) =
-        shared_held().filter(|of| held.iter().all(|held| held.as_ref().is_some_and(|held| held.reason == of.reason)))
-    {
+    // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
+    let reports = |held: &Option<Held>| held.as_ref().is_some_and(|held| held.reported_change().is_some());
+    let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
+    if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
         add_held(&mut joint.report, shared, &options.units);
     }
     for ((record, held), mut offset) in records.iter().zip(&held).zip(joint.zero_offsets.clone()) {

@@ -42,6 +42,11 @@ pub fn best_of_each_order(problem: &Problem) -> impl Iterator<Item = Fit> {
     best_up_to(problem, LARGEST_ORDER)
 }
 
+/// The number of readings without which a model of an order is not tried.
+pub fn fewest_readings(problem: &Problem, order: usize) -> usize {
+    READINGS_PER_PARAMETER * (problem.linear_columns(order) + order + 1)
+}
+
 /// The best models of order 0 to `largest`, as far as the readings allow. Each is fitted to all rows when it is asked for, as a fit of
 /// many rows is large.
 pub fn best_up_to(problem: &Problem, largest: usize) -> impl Iterator<Item = Fit> {
@@ -49,8 +54,7 @@ pub fn best_up_to(problem: &Problem, largest: usize) -> impl Iterator<Item = Fit
     let searched = part.as_ref().unwrap_or(problem);
     let mut found: Vec<Vec<Poles>> = Vec::new();
     for order in 0..=largest {
-        let parameters = problem.linear_columns(order) + order + 1;
-        if order > 0 && problem.rows() < READINGS_PER_PARAMETER * parameters {
+        if order > 0 && problem.rows() < fewest_readings(problem, order) {
             break;
         }
         found.push(best(searched, starts(searched, order, &found)));

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use simulation::units::Units;
 
 use crate::dimension::significant;
-use crate::linear::{Fit, Problem, Section};
+use crate::linear::{Fit, LARGEST_ORDER, Problem, Section, fewest_readings};
 use crate::nominal::models::STRUCTURED;
 use crate::nominal::report::{AtBound, FarReading, InputLaw, Report, ZeroShift};
 
@@ -36,7 +36,7 @@ pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
 pub(super) fn held(readings: usize) -> String {
     format!(
         "{readings} readings repeat the one before, to the last digit, because no new one was taken or sent; they are left out of the model and \
-         of its errors; `vsj diagnose` says what holds them."
+         of its errors."
     )
 }
 
@@ -96,7 +96,7 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
     let undriven: Vec<String> = undriven.collect();
     if !undriven.is_empty() {
         remarks.push(format!(
-            "The readings show {}, which the voltage does not drive: a drift or a hum, which `vsj diagnose` names; the model of the \
+            "The readings show {}, which the voltage does not drive: a drift or a hum, or noise that looks like one; the model of the \
              spring is without it.",
             undriven.join(" and ")
         ));
@@ -143,9 +143,15 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         ));
     }
     if report.rmse > STRUCTURED * report.noise.scatter && report.noise.scatter > 0.0 {
+        let order = report.linear.len();
+        let why = if order < LARGEST_ORDER {
+            let fewest = fewest_readings(problem, order + 1);
+            format!("a model of order {} is not tried with fewer than {fewest} readings", order + 1)
+        } else {
+            "no linear model of order 4 or less describes all of the response; `vsj diagnose` looks for what else is in it".into()
+        };
         remarks.push(format!(
-            "The errors ({} {}) exceed their scatter from row to row ({} {}): no linear model of order 4 or less describes all of the \
-             response; `vsj diagnose` names what else is in it.",
+            "The errors ({} {}) exceed their scatter from row to row ({} {}): {why}.",
             significant(report.rmse, 4),
             report.unit,
             significant(report.noise.scatter, 4),

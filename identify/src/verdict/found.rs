@@ -58,8 +58,9 @@ pub(crate) fn search(
         best = search.predicting(best, is_larger, held_out);
     }
     // An identified spring is the best without causes, stays as it is if the causes need no other, and causes under which it predicts
-    // worse are none.
+    // worse, or which are less likely than none, are none.
     if search.evaluator().data.normalisation.identified {
+        let root = search.root();
         let engine = search.evaluator();
         let as_identified = engine.fit_twice(Model { relaxation: Vec::new(), ..best.fit.model.clone() });
         let mut predicted = held_out(engine, &best.fit);
@@ -67,8 +68,9 @@ pub(crate) fn search(
         if kept <= AS_GOOD * predicted {
             (best.fit, predicted) = (as_identified, kept);
         }
-        if best.fit.model.blocks.is_empty() || predicted > error(&baseline.residual) {
-            best = Scored { fit: baseline.clone(), ..search.root() };
+        let is_unlikely = best.score < root.score;
+        if best.fit.model.blocks.is_empty() || predicted > error(&baseline.residual) || is_unlikely {
+            best = Scored { fit: baseline.clone(), ..root };
         }
     }
     let candidate = Candidate { fit: &best.fit, score: best.score };
