@@ -65,7 +65,8 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
     let linear = linear(records, options);
     found.report.linear = linear.as_ref().map(|linear| linear.error);
-    let judge = linear.as_ref().filter(|_| is_judged_by_linear(held.as_ref()));
+    // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
+    let judge = linear.as_ref().filter(|_| !reports_changes(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
     if options.without_dynamics && found.report.verdict == Verdict::Consistent {
@@ -82,15 +83,14 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
 /// Returns the record without the held readings that say nothing of the response.
 pub(super) fn informative<'r>(record: &'r Record, held: Option<&Held>) -> Cow<'r, Record> {
     match held {
-        Some(held) if held.reported_change().is_none() => Cow::Owned(held.left_out(record)),
+        Some(of) if !reports_changes(held) => Cow::Owned(of.left_out(record)),
         _ => Cow::Borrowed(record),
     }
 }
 
-/// Returns false for the record of a sensor that reports changes: its new readings are ahead of the response, because noise decides when
-/// they are sent, so that a linear model of them is no judge.
-pub(super) fn is_judged_by_linear(held: Option<&Held>) -> bool {
-    held.is_none_or(|held| held.reported_change().is_none())
+/// Returns true for the record of a sensor that reports changes.
+pub(super) fn reports_changes(held: Option<&Held>) -> bool {
+    held.is_some_and(|held| held.reported_change().is_some())
 }
 
 /// The best linear model of some records.

@@ -19,7 +19,7 @@ use simulation::record::Record;
 use crate::answer::{RecordReport, Report, Verdict};
 use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{self, examine, informative, is_judged_by_linear, joint};
+use crate::examine::passes::{self, examine, informative, joint, reports_changes};
 use crate::plant::base::Base;
 use crate::record::held::{Held, held};
 use crate::stats::median::median;
@@ -73,7 +73,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let plant = "the spring with the shared causes".to_owned();
     let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
     // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
-    let reports = |held: &Option<Held>| held.as_ref().is_some_and(|held| held.reported_change().is_some());
+    let reports = |held: &Option<Held>| reports_changes(held.as_ref());
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
         add_held(&mut joint.report, shared, &options.units);
@@ -112,8 +112,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     }
     joint.report.leftover =
         joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    let is_judged = held.iter().all(|held| is_judged_by_linear(held.as_ref()));
-    compare(&mut joint, linear.as_ref().filter(|_| is_judged));
+    compare(&mut joint, linear.as_ref().filter(|_| !held.iter().any(reports)));
     credibility::unlikely_to_suspects(&mut joint.report);
     Ok(joint)
 }
