@@ -30,6 +30,7 @@ use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
 use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
+use crate::record::clock::with_times_of_clock;
 use crate::record::data::Data;
 use crate::record::held::{Held, held};
 use crate::record::input::Input;
@@ -59,6 +60,8 @@ pub fn diagnose(record: &Record, options: &Options) -> Result<Report> {
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with fewer than eight readings.
 pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str)) -> Result<Diagnosis> {
+    let timed = with_times_of_clock(std::slice::from_ref(record));
+    let record = &timed[0];
     let held = held(record);
     let informative = informative(record, held.as_ref());
     let records = std::slice::from_ref(&*informative);

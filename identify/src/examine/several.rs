@@ -21,6 +21,7 @@ use crate::effects::EFFECTS;
 use crate::examine::options::Options;
 use crate::examine::passes::{self, examine, informative, joint, reports_changes};
 use crate::plant::base::Base;
+use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
 use crate::stats::median::median;
 use crate::stats::scale::root_mean_square;
@@ -47,6 +48,8 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     // A gain and a relaxation that all records share, and a zero for each, are not estimated anew for every set of causes.
     let options = &options.with_fixed_plant();
     let rows = records.iter().flat_map(|record| &record.rows).filter(|row| row.measured.is_some()).count();
+    let timed = with_times_of_clock(records);
+    let records = &timed[..];
     let held: Vec<Option<Held>> = records.iter().map(held).collect();
     let informative: Vec<Record> =
         records.iter().zip(&held).map(|(record, held)| informative(record, held.as_ref()).into_owned()).collect();

@@ -31,6 +31,8 @@ const LONGEST_DELAY: f64 = 0.1;
 const LONGEST_DECAY: f64 = 1.0;
 /// A decay is over by the end of a record if less than this part of it is left at the last reading.
 const OVER: f64 = 0.1;
+/// Relative difference of spacings that are equal but for the last digits of their numbers.
+const SAME_SPACING: f64 = 1e-12;
 /// A column of which the model spans all but this part adds nothing to it.
 const DEPENDENT: f64 = 1e-7;
 /// Rejected steps in succession after which a refinement ends.
@@ -236,7 +238,9 @@ impl Problem {
             frequency: (1.0 / (LONGEST_TAU * duration), std::f64::consts::PI / spacing),
             decay: LONGEST_DECAY * duration,
             delay: (0.0, LONGEST_DELAY * duration),
-            whole_rows: series.iter().all(|series| series.held && series.even && series.spacing == spacing),
+            whole_rows: series
+                .iter()
+                .all(|series| series.held && series.even && (series.spacing / spacing - 1.0).abs() < SAME_SPACING),
         };
         Self { series, spacing, bounds, readings, means, weights: Vec::new(), starts }
     }

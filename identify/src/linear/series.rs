@@ -3,6 +3,7 @@
 use simulation::record::Record;
 use simulation::schedule::Schedule;
 
+use crate::record::clock::Clock;
 use crate::record::decay::starts_at_rest;
 use crate::record::folds::folds;
 use crate::record::input::Input;
@@ -10,9 +11,6 @@ use crate::stats::median::median;
 
 /// Part of a length that is to the rest as that is to the length: multiples of it fall evenly on all parts of a unit.
 const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_8;
-
-/// Largest deviation of the rows' times from equal spacing, in spacings, that is attributed to the rounding of the times.
-const ROUNDING: f64 = 1e-3;
 
 /// Number of straight pieces that stand for the square of a ramp between two rows.
 const CHORDS: usize = 8;
@@ -43,7 +41,7 @@ pub struct Series {
     pub spacing: f64,
     /// True if the voltage is held between rows.
     pub held: bool,
-    /// True if the rows are equally spaced.
+    /// True if all times are multiples of the spacing.
     pub even: bool,
     pub(super) at_rest: bool,
     /// Times, after the record's first row, from which on all readings are shifted by a constant that is to be fitted.
@@ -52,17 +50,16 @@ pub struct Series {
 }
 
 impl Series {
-    /// Prepares a record. Rows without a reading only tell the voltage. Times that are equally spaced but for their rounding
-    /// are taken as equally spaced.
+    /// Prepares a record. Rows without a reading only tell the voltage. Times that are multiples of one interval but for their
+    /// rounding are taken as such.
     pub fn new(record: &Record, input: Input) -> Self {
         let first = record.rows.first().map_or(0.0, |row| row.time_s);
         let mut times: Vec<f64> = record.rows.iter().map(|row| row.time_s - first).collect();
         let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let spacing = median(&mut gaps).unwrap_or(1.0);
-        let step = times.last().unwrap_or(&0.0) / (times.len().max(2) - 1) as f64;
-        let evenly = times.iter().enumerate().all(|(row, time)| (time - row as f64 * step).abs() <= ROUNDING * step);
-        if evenly {
-            times.iter_mut().enumerate().for_each(|(row, time)| *time = row as f64 * step);
+        let clock = Clock::of(&times);
+        if let Some(clock) = &clock {
+            times.iter_mut().zip(&clock.ticks).for_each(|(time, tick)| *time = tick * clock.interval);
         }
         let voltage: Vec<f64> = record.rows.iter().map(|row| row.voltage_v).collect();
         let pieces = match input {
@@ -80,9 +77,9 @@ impl Series {
             time,
             reading,
             fold: folds(&commanded),
-            spacing: if evenly { step } else { spacing },
+            spacing: clock.as_ref().map_or(spacing, |clock| clock.interval),
             held: input == Input::Hold,
-            even: evenly,
+            even: clock.is_some(),
             shifts: Vec::new(),
             pieces,
         }

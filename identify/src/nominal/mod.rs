@@ -36,6 +36,7 @@ use crate::nominal::plant::VoltageRange;
 use crate::nominal::report::{AtBound, FarReading, InputLaw, ZeroShift};
 use crate::nominal::usable::check;
 use crate::record::bounds::Bounds;
+use crate::record::clock::with_times_of_clock;
 use crate::record::held::without_held;
 use crate::record::input::Input;
 
@@ -57,7 +58,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     for record in records {
         check(record)?;
     }
-    let new = without_held(records);
+    let new = without_held(&with_times_of_clock(records)).into_owned();
     let (mut kept, stopped) = without_stopped(&new);
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();

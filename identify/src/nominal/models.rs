@@ -7,6 +7,7 @@ use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_re
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::InputLaw;
 use crate::nominal::usable::check;
+use crate::record::clock::with_times_of_clock;
 use crate::record::held::without_held;
 use crate::record::input::Input;
 use crate::stats::median::robust_deviation;
@@ -200,7 +201,8 @@ pub fn best_linear(records: &[Record], input: Input) -> Option<BestLinear> {
     if input == Input::Stair || records.iter().any(|record| check(record).is_err()) {
         return None;
     }
-    let new = without_held(records);
+    let timed = with_times_of_clock(records);
+    let new = without_held(&timed);
     let problem = Problem::new(new.iter().map(|record| Series::new(record, input)).collect());
     let fits = best_of_each_order(&problem).enumerate().skip(1);
     let with_error = |(order, fit): (usize, Fit)| (order, held_out_residual(&problem, &fit), fit);

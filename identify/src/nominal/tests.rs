@@ -102,25 +102,48 @@ fn readings_at_a_bound_of_the_sensor_are_left_out() {
     assert!(expected.at_bound.is_empty() && expected.rows == 600);
 }
 
-/// A part of the rows is searched: levels of a round number of rows would give it readings at the same times after each step only.
-#[test]
-fn a_delay_is_found_in_more_rows_than_are_searched_under_levels_of_equal_length() {
+/// A record of a lag of 30 rows with share 0.1 that responds three rows late, under levels of 150 rows.
+fn late(rows: usize, interval_s: f64) -> Record {
     const DELAY: usize = 3;
-    let (rows, noise) = (6000, normals(6000));
+    let noise = normals(rows);
     let level = |row: usize| 10.0 * ((row / 150 * 7) % 11) as f64;
     let mut lag = 0.0;
     let row = |row: usize| {
         let late_v = if row < DELAY { 0.0 } else { level(row - DELAY) };
         let reading = 0.1 * late_v + 0.9 * lag + 0.2 * noise[row];
         lag = late_v + (lag - late_v) * f64::exp(-1.0 / 30.0);
-        Row { line: 0, time_s: 0.001 * row as f64, voltage_v: level(row), measured: Some(reading) }
+        Row { line: 0, time_s: interval_s * row as f64, voltage_v: level(row), measured: Some(reading) }
     };
-    let record = Record { name: "late".into(), rows: (0..rows).map(row).collect() };
-    let report = found(&[record]).report;
+    Record { name: "late".into(), rows: (0..rows).map(row).collect() }
+}
+
+/// A part of the rows is searched: levels of a round number of rows would give it readings at the same times after each step only.
+#[test]
+fn a_delay_is_found_in_more_rows_than_are_searched_under_levels_of_equal_length() {
+    let report = found(&[late(6000, 0.001)]).report;
     let Nominal { share, delay_s, .. } = &report.nominal;
     assert!(report.order == 1 && report.undriven_order == 0, "{report:?}");
     assert!(share.low < 0.1 && 0.1 < share.high && (delay_s.high - 0.003).abs() < 1e-9, "{report:?}");
     assert!(report.linear.iter().all(|of| of.held_out_rmse < 0.21), "{report:?}");
+}
+
+/// Taken as they are, times at 30 Hz in whole ms move readings before a step of the voltage, and let a delay of part of a row take the
+/// place of a part of the share.
+#[test]
+fn rounded_times_and_lost_rows_do_not_shift_the_delay() {
+    for lost in [usize::MAX, 7] {
+        let mut record = late(1500, 1.0 / 30.0);
+        record.rows.iter_mut().for_each(|row| row.time_s = (row.time_s * 1e3).round() / 1e3);
+        let mut row = 0;
+        record.rows.retain(|_| {
+            row += 1;
+            row % lost != 5 || row % 150 == 1
+        });
+        let report = found(&[record]).report;
+        let Nominal { share, delay_s, .. } = &report.nominal;
+        assert!(report.order == 1 && share.low < 0.1 && 0.1 < share.high, "{report:?}");
+        assert!((delay_s.value * 30.0 - 3.0).abs() < 1e-3 && delay_s.low < 0.1, "{report:?}");
+    }
 }
 
 /// Each row in which no new reading came repeats the one before: half of them, by a linear congruential generator.

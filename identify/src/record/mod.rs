@@ -5,12 +5,14 @@
 //! - *Reading*: measured stiffness, normalised to the equivalent static voltage, in V.
 //! - *Command*: the voltage that was sent to the amplifier, in V.
 //! - *Fold*: the rows that one fit of a cross-validation does not use; its prediction of these rows is held out.
+//! - *Clock*: one interval of which the times of all rows are multiples.
 //! - *Segment*: neighbouring rows that belong to the same fold.
 //! - *Quantisation grid*: equally spaced values to which the readings were rounded.
 //! - *Censored reading*: one that stopped at a bound of the sensor.
 
 pub mod bounds;
 pub(crate) mod changes;
+pub mod clock;
 pub mod data;
 pub(crate) mod decay;
 mod first_order;
