@@ -20,7 +20,7 @@ pub mod section;
 pub mod series;
 
 pub use held_out::held_out_residual;
-pub use problem::{Fit, Poles, Problem};
+pub use problem::{Fit, Poles, Problem, SAME_PLACE};
 pub use search::{LARGEST_ORDER, best_of_each_order, best_up_to, fewest_readings};
 pub use section::Section;
 pub use series::Series;

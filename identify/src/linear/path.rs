@@ -3,10 +3,7 @@
 use std::collections::HashMap;
 
 use crate::linear::section::{Each, Following, Section, States, TOGETHER, Transition};
-use crate::linear::series::{Piece, Series};
-
-/// Times closer than this, in spacings of the rows, count as equal.
-const SAME: f64 = 1e-9;
+use crate::linear::series::{Piece, SAME, Series};
 
 /// A step over which the voltage is linear.
 struct Step {

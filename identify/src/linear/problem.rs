@@ -31,6 +31,8 @@ const LONGEST_DELAY: f64 = 0.1;
 const LONGEST_DECAY: f64 = 1.0;
 /// A decay is over by the end of a record if less than this part of it is left at the last reading.
 const OVER: f64 = 0.1;
+/// Distance of a delay from the end of a place, in spacings of the rows, with which it lies in the next one.
+pub const SAME_PLACE: f64 = 1e-6;
 /// Relative difference of spacings that are equal but for the last digits of their numbers.
 const SAME_SPACING: f64 = 1e-12;
 /// A column of which the model spans all but this part adds nothing to it.
@@ -61,8 +63,10 @@ pub struct Bounds {
     pub decay: f64,
     /// Delays.
     pub delay: (f64, f64),
-    /// True if only delays of whole rows are searched: under a voltage that is held over equal rows, a part of a row has the same
-    /// effect on the readings as another numerator.
+    /// True if the voltage is held between rows: as long as no reading changes its place between the delayed steps, a longer delay has
+    /// the same effect on the readings as another numerator, so that one delay of each [`Problem::place_of_delay`] is searched.
+    pub held: bool,
+    /// True if these places are whole rows: the voltage is held over equal rows.
     pub whole_rows: bool,
 }
 
@@ -233,14 +237,15 @@ impl Problem {
             readings.values.extend(series.reading.iter().map(|reading| reading - mean));
             means.push(mean);
         }
+        let held = series.iter().all(|series| series.held);
+        let even = |series: &Series| series.even && (series.spacing / spacing - 1.0).abs() < SAME_SPACING;
         let bounds = Bounds {
             tau: (0.05 * spacing, LONGEST_TAU * duration),
             frequency: (1.0 / (LONGEST_TAU * duration), std::f64::consts::PI / spacing),
             decay: LONGEST_DECAY * duration,
             delay: (0.0, LONGEST_DELAY * duration),
-            whole_rows: series
-                .iter()
-                .all(|series| series.held && series.even && (series.spacing / spacing - 1.0).abs() < SAME_SPACING),
+            held,
+            whole_rows: held && series.iter().all(even),
         };
         Self { series, spacing, bounds, readings, means, weights: Vec::new(), starts }
     }
@@ -497,7 +502,7 @@ impl Problem {
     }
 
     /// Fits the linear coefficients and adds the derivatives by the searched parameters to the basis: the logarithms of each
-    /// section, then the delay in spacings of the rows, if it is not searched in whole rows.
+    /// section, then the delay in spacings of the rows, unless the voltage is held.
     pub fn linearised(&self, poles: Poles) -> Fit {
         self.linearised_on(&self.paths(poles.delay), poles)
     }
@@ -535,24 +540,21 @@ impl Problem {
             }
             column += section.order();
         }
-        if !self.bounds.whole_rows {
+        if !self.bounds.held {
             let change = self.change_by_delay(&fit, shared, paths, responses);
             fit.basis.add(self.weighted(change));
         }
         fit
     }
 
-    /// The derivative of the model by the delay, in spacings of the rows. The instantaneous response to a held voltage jumps with
-    /// the delay; its jumps are left out.
+    /// The derivative of the model by the delay, in spacings of the rows.
     fn change_by_delay(&self, fit: &Fit, shared: usize, paths: &[Path], responses: &[Vec<Response>]) -> Column {
         let later = self.paths(fit.poles.delay + SMALL_DELAY * self.spacing);
         let mut change = Column { first: 0, values: vec![0.0; self.rows()] };
         for (record, (path, &first)) in later.iter().zip(&self.starts).enumerate() {
             let rows = &mut change.values[first..first + path.voltage.len()];
             let factor = |at: usize| fit.coefficients[shared + at] / SMALL_DELAY;
-            if !self.series[record].held {
-                add_difference(rows, factor(0), &path.voltage, &paths[record].voltage);
-            }
+            add_difference(rows, factor(0), &path.voltage, &paths[record].voltage);
             let mut column = 1;
             let delayed = path.responses(&fit.poles.sections);
             for (index, &section) in fit.poles.sections.iter().enumerate() {
@@ -573,7 +575,7 @@ impl Problem {
         let (mut damping, mut rejected) = (1e-3, 0);
         let floor = 1e-28 * self.power();
         for _ in 0..most {
-            // Without poles, with a delay of whole rows, nothing is searched.
+            // Without poles, under a voltage that is held, nothing is searched.
             if fit.basis.count() == self.linear_columns(fit.poles.order()) {
                 break;
             }
@@ -649,7 +651,7 @@ impl Problem {
 
     /// The poles, moved into the bounds.
     pub(super) fn within(&self, poles: Poles) -> Poles {
-        let Bounds { tau: taus, frequency: frequencies, decay, delay, whole_rows } = self.bounds;
+        let Bounds { tau: taus, frequency: frequencies, decay, delay, .. } = self.bounds;
         let inside = |section| match section {
             Section::First { tau } => Section::First { tau: tau.clamp(taus.0, taus.1) },
             Section::Second { frequency, damping } => {
@@ -660,9 +662,28 @@ impl Problem {
                 Section::Second { frequency, damping: damping.clamp(least, most) }
             }
         };
-        let late = if whole_rows { (poles.delay / self.spacing).round() * self.spacing } else { poles.delay };
         let sections = poles.sections.into_iter().map(inside).collect();
-        Poles { sections, undriven: poles.undriven, delay: late.clamp(delay.0, delay.1) }
+        Poles { sections, undriven: poles.undriven, delay: poles.delay.clamp(delay.0, delay.1) }
+    }
+
+    /// The delay that is searched for this one, within the bounds: whole rows, or the middle of its place under a held voltage.
+    pub(super) fn delay_within(&self, delay: f64) -> f64 {
+        let Bounds { delay: (least, most), held, whole_rows, .. } = self.bounds;
+        let delay = delay.clamp(least, most);
+        if whole_rows {
+            ((delay / self.spacing).round() * self.spacing).clamp(least, most)
+        } else if held && delay > 0.0 {
+            let (above, up_to) = self.place_of_delay(delay);
+            0.5 * (above.max(least) + up_to.min(most))
+        } else {
+            delay
+        }
+    }
+
+    /// The delays with which every reading keeps its place between the steps of a held voltage: those above the first, up to the second.
+    pub fn place_of_delay(&self, delay: f64) -> (f64, f64) {
+        let places = self.series.iter().map(|series| series.place_of_delay(delay));
+        places.fold((f64::NEG_INFINITY, f64::INFINITY), |(above, up_to), of| (above.max(of.0), up_to.min(of.1)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::linear::problem::{Fit, Poles, Problem};
+use crate::linear::problem::{Fit, Poles, Problem, SAME_PLACE};
 use crate::linear::section::Section;
 use crate::linear::series::Series;
 use crate::stats::periodogram::powers;
@@ -25,8 +25,12 @@ const DAMPINGS: [f64; 2] = [0.05, 0.3];
 const STARTS: (usize, usize) = (5, 2);
 /// Steps of the quick and of the complete refinement.
 const STEPS: (usize, usize) = (5, 25);
-/// Most jumps of the delay by a row or two after a refinement.
-const MOST_DELAY_JUMPS: usize = 6;
+/// Most jumps of the delay by up to two rows after a refinement.
+const MOST_DELAY_JUMPS: usize = 10;
+/// Shortest step of a delay in uneven rows, in spacings of the rows.
+const LEAST_DELAY_STEP: f64 = 0.01;
+/// Places of the delay on both sides that are tried next in uneven rows.
+const PLACES_NEAR: usize = 3;
 /// Most steps on all rows of a record of which only a part was searched, and the relative reduction of the cost below which they
 /// end.
 const STEPS_ON_ALL: (usize, f64) = (4, 1e-5);
@@ -62,6 +66,7 @@ pub fn best_up_to(problem: &Problem, largest: usize) -> impl Iterator<Item = Fit
     let (steps, least) = if part.is_some() { STEPS_ON_ALL } else { (STEPS.1, LEAST.2) };
     found.into_iter().map(move |models| {
         let first = models.into_iter().next().expect("a best model");
+        let first = if part.is_some() { settled(problem, first) } else { first };
         problem.refined(problem.within(first), steps, least)
     })
 }
@@ -82,10 +87,9 @@ fn best(problem: &Problem, mut tried: Vec<(f64, Poles)>) -> Vec<Poles> {
     // A delay crosses whole rows only in jumps.
     for _ in 0..MOST_DELAY_JUMPS {
         let best = tried[0].clone();
-        let rows = (best.1.delay / problem.spacing).floor();
-        let around = [rows - 2.0, rows - 1.0, rows - 0.5, rows, rows + 0.5, rows + 1.0, rows + 2.0];
-        let near = around.map(|rows| problem.within(Poles { delay: rows * problem.spacing, ..best.1.clone() }));
-        let near = near.into_iter().filter(|poles| tried.iter().all(|(_, other)| other.delay != poles.delay)).collect();
+        let near = delays_near(problem, best.1.delay).into_iter();
+        let near = near.map(|delay| Poles { delay: problem.delay_within(delay), ..best.1.clone() });
+        let near = near.filter(|poles| tried.iter().all(|(_, other)| other.delay != poles.delay)).collect();
         let mut near = costs(problem, near);
         near.truncate(STARTS.1);
         tried.extend(refine(near, STEPS.0, LEAST.1));
@@ -138,10 +142,10 @@ fn starts(problem: &Problem, order: usize, found: &[Vec<Poles>]) -> Vec<(f64, Po
         0 => return costs(problem, delays(problem).map(none).collect()),
         1 => delays(problem).for_each(|delay| starts.extend(with_each(problem, none(delay), |_| lags.clone()))),
         _ => {
-            for base in with_less_delay(&found[order - 1]) {
+            for base in with_less_delay(problem, &found[order - 1]) {
                 starts.extend(with_each(problem, base, |_| lags.clone()));
             }
-            for base in with_less_delay(&found[order - 2]) {
+            for base in with_less_delay(problem, &found[order - 2]) {
                 starts.extend(with_each(problem, base, |fit| pairs(problem, fit)));
             }
         }
@@ -169,10 +173,10 @@ fn pairs(problem: &Problem, fit: &Fit) -> Vec<Section> {
 }
 
 /// The best model, and the same with less delay where it has one: a further pole takes the place of a part of the delay.
-fn with_less_delay(models: &[Poles]) -> Vec<Poles> {
+fn with_less_delay(problem: &Problem, models: &[Poles]) -> Vec<Poles> {
     let Some(best) = models.first() else { return Vec::new() };
     let parts: &[f64] = if best.delay > 0.0 { &[1.0, 0.5, 0.0] } else { &[1.0] };
-    parts.iter().map(|part| Poles { delay: part * best.delay, ..best.clone() }).collect()
+    parts.iter().map(|part| Poles { delay: problem.delay_within(part * best.delay), ..best.clone() }).collect()
 }
 
 /// A model with a further section; two lags become one section of second order.
@@ -189,6 +193,46 @@ fn with(base: &Poles, section: Section) -> Poles {
     poles
 }
 
+/// Delays near another one: whole and half rows, or, in uneven rows, the next places and others further and further away.
+fn delays_near(problem: &Problem, delay: f64) -> Vec<f64> {
+    if problem.bounds.held && !problem.bounds.whole_rows {
+        let (above, up_to) = problem.place_of_delay(delay);
+        let further = geometric(LEAST_DELAY_STEP, 2.0, 2.0).flat_map(|rows| {
+            let by = rows * problem.spacing;
+            [above - by, up_to + by]
+        });
+        let before = |up_to: &f64| Some(problem.place_of_delay(*up_to).0);
+        let after = |above: &f64| {
+            Some(problem.place_of_delay(above + SAME_PLACE * problem.spacing).1 + SAME_PLACE * problem.spacing)
+        };
+        let next = std::iter::successors(Some(above), before).take(PLACES_NEAR);
+        let next =
+            next.chain(std::iter::successors(Some(up_to + SAME_PLACE * problem.spacing), after).take(PLACES_NEAR));
+        further.chain(next).filter(|delay| delay.is_finite()).collect()
+    } else {
+        let rows = (delay / problem.spacing).floor();
+        [-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|by| (rows + by) * problem.spacing).to_vec()
+    }
+}
+
+/// The model with the best delay near its own, its sections unchanged: a part of the rows told fewer places of the delay apart.
+fn settled(problem: &Problem, poles: Poles) -> Poles {
+    let mut best = Poles { delay: problem.delay_within(poles.delay), ..poles };
+    if !problem.bounds.held || problem.bounds.whole_rows {
+        return best;
+    }
+    let mut cost = problem.fit(best.clone()).cost;
+    for _ in 0..MOST_DELAY_JUMPS {
+        let near = delays_near(problem, best.delay).into_iter();
+        let near = near.map(|delay| Poles { delay: problem.delay_within(delay), ..best.clone() }).collect();
+        match costs(problem, near).into_iter().next() {
+            Some((there, poles)) if there < cost => (cost, best) = (there, poles),
+            _ => break,
+        }
+    }
+    best
+}
+
 /// Delays that are tried: whole and half rows at first, then further and further apart.
 fn delays(problem: &Problem) -> impl Iterator<Item = f64> + '_ {
     let rows = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -196,7 +240,7 @@ fn delays(problem: &Problem) -> impl Iterator<Item = f64> + '_ {
     let possible = |rows: &f64| !problem.bounds.whole_rows || rows.fract() == 0.0;
     let delays = rows.into_iter().chain(further).filter(possible).map(|rows| rows * problem.spacing);
     let longest = problem.bounds.delay.1;
-    delays.take_while(move |delay| *delay <= longest)
+    delays.take_while(move |delay| *delay <= longest).map(|delay| problem.delay_within(delay))
 }
 
 fn geometric(from: f64, to: f64, ratio: f64) -> impl Iterator<Item = f64> {

@@ -9,6 +9,9 @@ use crate::record::folds::folds;
 use crate::record::input::Input;
 use crate::stats::median::median;
 
+/// Times closer than this, in spacings of the rows, count as equal.
+pub(super) const SAME: f64 = 1e-9;
+
 /// Part of a length that is to the rest as that is to the length: multiples of it fall evenly on all parts of a unit.
 const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_8;
 
@@ -198,6 +201,18 @@ impl Series {
     /// Number of readings.
     pub fn rows(&self) -> usize {
         self.reading.len()
+    }
+
+    /// The delays with which every reading keeps its place between the starts of the pieces: those above the first, up to the second.
+    pub(super) fn place_of_delay(&self, delay: f64) -> (f64, f64) {
+        let later = self.pieces.iter().skip(1).map(|piece| piece.start);
+        later.fold((f64::NEG_INFINITY, f64::INFINITY), |(above, up_to), start| {
+            // A reading is taken just after a step that coincides with it.
+            let after = self.time.partition_point(|time| *time < start + delay - SAME * self.spacing);
+            let before = after.checked_sub(1).map_or(f64::NEG_INFINITY, |row| self.time[row] - start);
+            let next = self.time.get(after).map_or(f64::INFINITY, |time| time - start);
+            (above.max(before), up_to.min(next))
+        })
     }
 
     pub(super) fn pieces(&self) -> &[Piece] {

@@ -1,6 +1,6 @@
-//! Intervals of 95 % for the quantities of a model: the delta method on the fit's covariance, and which whole rows of delay fit.
+//! Intervals of 95 % for the quantities of a model: the delta method on the fit's covariance, and which delays fit.
 
-use crate::linear::{Fit, Poles, Problem};
+use crate::linear::{Fit, Poles, Problem, SAME_PLACE};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::models::{REFIT, steps};
@@ -64,22 +64,48 @@ pub(super) fn not_negative(quantity: Quantity) -> Quantity {
     Quantity { low: quantity.low.max(0.0), ..quantity }
 }
 
-/// The delay if only whole rows are searched: all delays whose fit is not significantly worse. A part of a row is
-/// equivalent to another numerator, so that the interval reaches one row further down.
-pub(super) fn whole_rows(problem: &Problem, fit: &Fit) -> Quantity {
+/// The delay under a voltage that is held: all places of it whose fit is not significantly worse, from end to end.
+pub(super) fn places(problem: &Problem, fit: &Fit) -> Quantity {
     const MOST: usize = 4;
     let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);
     let degrees = problem.rows().saturating_sub(fit.degrees()).max(1) as f64;
     let tolerated = Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
-    let rows = (fit.poles.delay / problem.spacing).round();
-    let fits = |rows: f64| {
-        let poles = Poles { delay: rows * problem.spacing, ..fit.poles.clone() };
-        rows >= 0.0
-            && rows * problem.spacing <= problem.bounds.delay.1
-            && problem.refined(poles, steps(problem), REFIT.1).cost <= fit.cost + tolerated
+    let (least, most) = problem.bounds.delay;
+    let fits = |(above, up_to): (f64, f64)| {
+        let poles = Poles {
+            delay: if problem.bounds.whole_rows { up_to } else { 0.5 * (above.max(least) + up_to) },
+            ..fit.poles.clone()
+        };
+        up_to >= least && up_to <= most && problem.refined(poles, steps(problem), REFIT.1).cost <= fit.cost + tolerated
     };
-    let reach = |sign: f64| (1..=MOST).map(|by| rows + sign * by as f64).take_while(|&rows| fits(rows)).last();
-    let low = (reach(-1.0).unwrap_or(rows) - 1.0).max(0.0) * problem.spacing;
-    let high = reach(1.0).unwrap_or(rows) * problem.spacing;
-    Quantity { value: fit.poles.delay, low, high, unit: "s".into() }
+    let beyond = SAME_PLACE * problem.spacing;
+    let own = problem.place_of_delay(fit.poles.delay);
+    let reach = |next: &dyn Fn((f64, f64)) -> f64| {
+        let further = std::iter::successors(Some(own), |place| Some(problem.place_of_delay(next(*place)))).skip(1);
+        further.take(MOST).take_while(|place| fits(*place)).last().unwrap_or(own)
+    };
+    let (above, _) = reach(&|(above, _)| above);
+    let (_, up_to) = reach(&|(_, up_to)| up_to + beyond);
+    Quantity { value: fit.poles.delay, low: above.clamp(least, most), high: up_to.clamp(least, most), unit: "s".into() }
+}
+
+/// The least and the largest of each quantity, in the order of [`Canonical::values`], with the delays of the fit's place, which all
+/// fit alike. Of whole rows it is only the last one: the quantities are those of a spring that is late by whole rows.
+pub(super) fn within_place_of_delay(problem: &Problem, fit: &Fit, canonical: &Canonical) -> Vec<(f64, f64)> {
+    let mut reach: Vec<(f64, f64)> =
+        canonical.values(canonical).into_iter().flatten().map(|value| (value, value)).collect();
+    if !problem.bounds.held || problem.bounds.whole_rows {
+        return reach;
+    }
+    let (above, up_to) = problem.place_of_delay(fit.poles.delay);
+    let (least, most) = problem.bounds.delay;
+    let ends = [above + SAME_PLACE * problem.spacing, up_to].map(|delay| delay.clamp(least, most));
+    for delay in ends {
+        let there = problem.fit(Poles { delay, ..fit.poles.clone() });
+        for (of, value) in reach.iter_mut().zip(Canonical::of(problem, &there).values(canonical).into_iter().flatten())
+        {
+            *of = (of.0.min(value), of.1.max(value));
+        }
+    }
+    reach
 }

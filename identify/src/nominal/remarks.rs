@@ -124,10 +124,13 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
             remarks.push(format!("The record hardly tells the time constant {}.", time(lag.tau.value)));
         }
     }
-    if problem.bounds.whole_rows && nominal.delay_s.value > 0.0 && report.order > 0 {
+    if problem.bounds.held && nominal.delay_s.value > 0.0 && report.order > 0 {
+        let readings = match problem.bounds.whole_rows {
+            true => format!("Readings every {}", time(problem.spacing)),
+            false => "The times of the readings".into(),
+        };
         remarks.push(format!(
-            "Readings every {} cannot tell a part of this delay from a part of the instantaneous share: the delay is {} to {}.",
-            time(problem.spacing),
+            "{readings} cannot tell a part of this delay from a part of the instantaneous share: the delay is {} to {}.",
             time(nominal.delay_s.low),
             time(nominal.delay_s.high)
         ));

@@ -146,6 +146,49 @@ fn rounded_times_and_lost_rows_do_not_shift_the_delay() {
     }
 }
 
+/// In uneven rows under a held voltage, a delay is known up to the next one with which a reading changes its place between the steps.
+#[test]
+fn intervals_contain_delay_and_share_in_uneven_rows() {
+    const RECORDS: usize = 20;
+    let record = |seed: usize| {
+        let (noise, uneven) = (normals(400 * (seed + 1)), normals(400 * (seed + 21)));
+        let gap_s = |row: usize| 0.05 + 0.1 * uneven[400 * (seed + 20) + row].abs();
+        let times: Vec<f64> = (0..400)
+            .scan(0.0, |time_s, row| {
+                *time_s += gap_s(row);
+                Some(*time_s)
+            })
+            .collect();
+        let level = |row: usize| 10.0 * ((row / 25 * 7 + seed) % 11) as f64;
+        // The lag's response to each step, 0.2 s late.
+        let late = |row: usize| -> f64 {
+            let steps = (1..=row).filter(|at| level(*at) != level(at - 1));
+            let response = |at: usize| match times[row] - times[at] - 0.2 {
+                since_s if since_s >= 0.0 => (level(at) - level(at - 1)) * (1.0 - 0.8 * f64::exp(-since_s / 1.5)),
+                _ => 0.0,
+            };
+            level(0) + steps.map(response).sum::<f64>()
+        };
+        let row = |row: usize| {
+            let measured = Some(late(row) + 0.2 * noise[400 * seed + row]);
+            Row { line: 0, time_s: times[row], voltage_v: level(row), measured }
+        };
+        Record { name: "uneven".into(), rows: (0..400).map(row).collect() }
+    };
+    let contains = |of: &Quantity, value: f64| (of.low..=of.high).contains(&value);
+    let reports: Vec<Report> = (0..RECORDS).map(|seed| found(&[record(seed)]).report).collect();
+    let hold = reports.iter().filter(|report| {
+        let Nominal { share, delay_s, tau_s, .. } = &report.nominal;
+        contains(share, 0.2) && contains(delay_s, 0.2) && tau_s.len() == 1 && contains(&tau_s[0].tau, 1.5)
+    });
+    let hold = hold.count();
+    let narrow =
+        reports.iter().filter(|report| report.nominal.delay_s.high - report.nominal.delay_s.low < 0.05).count();
+    assert!(hold >= 17 && narrow >= 17, "{hold} {narrow}");
+    let remark = |report: &Report| report.remarks.iter().any(|of| of.contains("The times of the readings cannot tell"));
+    assert!(reports.iter().all(remark));
+}
+
 /// Each row in which no new reading came repeats the one before: half of them, by a linear congruential generator.
 #[test]
 fn readings_that_repeat_because_no_new_one_came_are_left_out() {
