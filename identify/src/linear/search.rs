@@ -65,8 +65,10 @@ pub fn best_up_to(problem: &Problem, largest: usize) -> impl Iterator<Item = Fit
     }
     let (steps, least) = if part.is_some() { STEPS_ON_ALL } else { (STEPS.1, LEAST.2) };
     found.into_iter().map(move |models| {
-        let first = models.into_iter().next().expect("a best model");
-        let first = if part.is_some() { settled(problem, first) } else { first };
+        let mut first = models.into_iter().next().expect("a best model");
+        if let Some(part) = &part {
+            first = settled(problem, part, first);
+        }
         problem.refined(problem.within(first), steps, least)
     })
 }
@@ -201,33 +203,45 @@ fn delays_near(problem: &Problem, delay: f64) -> Vec<f64> {
             let by = rows * problem.spacing;
             [above - by, up_to + by]
         });
-        let before = |up_to: &f64| Some(problem.place_of_delay(*up_to).0);
-        let after = |above: &f64| {
-            Some(problem.place_of_delay(above + SAME_PLACE * problem.spacing).1 + SAME_PLACE * problem.spacing)
-        };
-        let next = std::iter::successors(Some(above), before).take(PLACES_NEAR);
-        let next =
-            next.chain(std::iter::successors(Some(up_to + SAME_PLACE * problem.spacing), after).take(PLACES_NEAR));
-        further.chain(next).filter(|delay| delay.is_finite()).collect()
+        further.chain(next_places(problem, delay)).collect()
     } else {
         let rows = (delay / problem.spacing).floor();
         [-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0].map(|by| (rows + by) * problem.spacing).to_vec()
     }
 }
 
-/// The model with the best delay near its own, its sections unchanged: a part of the rows told fewer places of the delay apart.
-fn settled(problem: &Problem, poles: Poles) -> Poles {
-    let mut best = Poles { delay: problem.delay_within(poles.delay), ..poles };
+/// Delays in the next places on both sides of that of a delay.
+fn next_places(problem: &Problem, delay: f64) -> Vec<f64> {
+    let beyond = SAME_PLACE * problem.spacing;
+    let (above, up_to) = problem.place_of_delay(delay);
+    let before = std::iter::successors(Some(above), |up_to| Some(problem.place_of_delay(*up_to).0));
+    let after = std::iter::successors(Some(up_to + beyond), |delay| Some(problem.place_of_delay(*delay).1 + beyond));
+    before.take(PLACES_NEAR).chain(after.take(PLACES_NEAR)).filter(|delay| delay.is_finite()).collect()
+}
+
+/// The model with the best delay near its own, its sections unchanged: `part` of the rows told fewer places of the delay apart.
+fn settled(problem: &Problem, part: &Problem, poles: Poles) -> Poles {
     if !problem.bounds.held || problem.bounds.whole_rows {
-        return best;
+        return poles;
     }
+    let width = |(above, up_to): (f64, f64)| (up_to - above).clamp(SAME_PLACE * problem.spacing, problem.spacing);
+    let mut step = width(part.place_of_delay(poles.delay));
+    let mut best = Poles { delay: problem.delay_within(poles.delay), ..poles };
     let mut cost = problem.fit(best.clone()).cost;
+    let mut jump = |delays: &[f64], best: &mut Poles| {
+        let delays = delays.iter().map(|delay| problem.delay_within(*delay)).filter(|delay| *delay != best.delay);
+        let near = costs(problem, delays.map(|delay| Poles { delay, ..best.clone() }).collect());
+        let better = near.into_iter().next().filter(|(there, _)| *there < cost);
+        better.map(|(there, poles)| (cost, *best) = (there, poles)).is_some()
+    };
+    while step > width(problem.place_of_delay(best.delay)) {
+        if !jump(&[best.delay - step, best.delay + step], &mut best) {
+            step *= 0.5;
+        }
+    }
     for _ in 0..MOST_DELAY_JUMPS {
-        let near = delays_near(problem, best.delay).into_iter();
-        let near = near.map(|delay| Poles { delay: problem.delay_within(delay), ..best.clone() }).collect();
-        match costs(problem, near).into_iter().next() {
-            Some((there, poles)) if there < cost => (cost, best) = (there, poles),
-            _ => break,
+        if !jump(&next_places(problem, best.delay), &mut best) {
+            break;
         }
     }
     best
