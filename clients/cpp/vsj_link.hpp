@@ -25,6 +25,7 @@
 #include <cstdio>
 #include <cstring>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -495,15 +496,21 @@ private:
         addrinfo* found = nullptr;
         const int error = ::getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &wanted, &found);
         if (error != 0) cannot_open(::gai_strerror(error));
-        sockaddr_storage first{};
-        const socklen_t length = found->ai_addrlen;
-        std::memcpy(&first, found->ai_addr, length);
-        file_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        ::freeaddrinfo(found);
-        if (file_ < 0) cannot_open(std::strerror(errno));
-        const int now = 1;
-        ::setsockopt(file_, IPPROTO_TCP, TCP_NODELAY, &now, sizeof now);
-        connect(reinterpret_cast<const sockaddr*>(&first), length, timeout);
+        const std::unique_ptr<addrinfo, void (*)(addrinfo*)> all(found, ::freeaddrinfo);
+        // A name may stand for several addresses, of which not all are listened on.
+        for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
+            try {
+                file_ = ::socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+                if (file_ < 0) cannot_open(std::strerror(errno));
+                const int now = 1;
+                ::setsockopt(file_, IPPROTO_TCP, TCP_NODELAY, &now, sizeof now);
+                return connect(at->ai_addr, at->ai_addrlen, timeout);
+            } catch (const Error&) {
+                if (at->ai_next == nullptr) throw;
+                if (file_ >= 0) ::close(file_);
+                file_ = -1;
+            }
+        }
     }
 
     void serial(unsigned baud) {
@@ -519,6 +526,9 @@ private:
         if (rate == std::end(rates)) cannot_open("a baud rate of " + std::to_string(baud) + " is not usual");
         ::cfmakeraw(&line);
         line.c_cflag |= CLOCAL | CREAD;
+        // An earlier program may have left its flow control and stop bits.
+        line.c_cflag &= ~(CSTOPB | CRTSCTS);
+        line.c_iflag &= ~(IXON | IXOFF | IXANY);
         ::cfsetspeed(&line, rate->second);
         if (::tcsetattr(file_, TCSANOW, &line) != 0) cannot_open(std::strerror(errno));
         // Other programs would interfere.
@@ -775,6 +785,11 @@ private:
         return reply;
     }
 
+    /// Whether a reply refuses a request because it belongs to no session, or to another one.
+    static bool is_of_no_session(const Bytes& reply) {
+        return reply.size() > 1 && reply[0] == 1 && (reply[1] == 4 || reply[1] == 18);
+    }
+
     /// Sends a request and repeats it until it is answered.
     Bytes exchange(const Bytes& message) {
         const bool is_hello = message[0] == 0;
@@ -789,6 +804,8 @@ private:
                 heard_ = Clock::now();
                 if (answer->version != wire::version) refuse({3, answer->version});
                 if (is_hello) session_ = answer->session;
+                // No number of the session was used: the microcontroller knows another one, or none.
+                if (is_of_no_session(answer->message)) --requests_;
                 if (answer->message[0] == 1) refuse(Bytes(answer->message.begin() + 1, answer->message.end()));
                 return std::move(answer->message);
             }

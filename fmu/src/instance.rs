@@ -13,6 +13,8 @@ use crate::variables::variables;
 
 /// Largest distance of a time from a tick, in ticks: importers add up steps, whose rounding errors add up too.
 const TOLERANCE: f64 = 1e-3;
+/// Most ticks of one step.
+const MOST_TICKS: f64 = 1e10;
 
 /// Receives the message of an error.
 pub(crate) type Log = Box<dyn Fn(&str)>;
@@ -187,6 +189,13 @@ impl Instance {
                 number(1.0 / rate_hz)
             );
         }
+        if last - *ticks as f64 > MOST_TICKS {
+            bad_input!(
+                "a step of {} s is {} ticks: expected at most {MOST_TICKS:e}",
+                number(step_s),
+                number(step_s * rate_hz)
+            );
+        }
         let last = last as u64;
         machine.run(last - *ticks, &self.variables, values)?;
         *ticks = last;
@@ -240,6 +249,7 @@ mod tests {
         refused(instance.begin_at(0.0), "is set in the initialization");
         refused(instance.enter_initialization(), "begins in the initialization");
         instance.exit_initialization().expect("parameters in their ranges");
+        refused(instance.step(5.0, 1e300), "expected at most 1e10");
         instance.step(5.0, 0.002).expect("two ticks");
         for _ in 0..2 {
             refused(instance.begin_at(0.0), "is set in the middle of a simulation");

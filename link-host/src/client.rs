@@ -63,6 +63,9 @@ pub struct Client {
 /// Requests after which a client begins a new session: a session has 65 536 numbers.
 const MOST_REQUESTS: u16 = 60_000;
 
+/// Longest wait for the answer to the last request.
+const LEAVING: Duration = Duration::from_millis(200);
+
 /// Reports that are confirmed after one request, at most.
 const MOST_HEARD: usize = 16;
 
@@ -137,6 +140,13 @@ impl Client {
         Ok(self.samples.drain(..))
     }
 
+    /// Disables the output before the connection ends, without waiting long for an answer.
+    pub fn leave(&mut self) {
+        self.patience = Patience::of(LEAVING);
+        // Without its host the MCU ramps down by itself.
+        let _ = self.exchange(Request::Disarm);
+    }
+
     /// Asks for a new session; the next request begins it.
     pub(crate) fn begin(&mut self) -> Result<(), Failure> {
         self.session = Nonce::NONE;
@@ -205,6 +215,10 @@ impl Client {
                 }
                 if request == Request::Hello {
                     self.session = session;
+                }
+                if matches!(reply, Ok(Reply::Refused(Reason::HelloFirst | Reason::OtherSession))) {
+                    // No number of the session was used: the MCU knows another one, or none.
+                    self.requests -= 1;
                 }
                 return match reply {
                     Err(version) => Err(Failure::Version(version)),
@@ -385,6 +399,20 @@ mod tests {
         drop(client);
         let counters = thread.join().unwrap();
         assert_eq!((counters.out_of_order, counters.unknown), (0, 0));
+    }
+
+    /// A program that sends heartbeats without reading their answers would not notice that the MCU has restarted.
+    #[test]
+    fn requests_that_the_mcu_refuses_as_of_another_session_begin_none() {
+        let (mut client, thread) = connected(|_| Faults::NONE);
+        client.session = Nonce::NONE;
+        client.requests = MOST_REQUESTS - 2;
+        for _ in 0..5 {
+            let refused = client.order(Request::Heartbeat);
+            assert!(matches!(refused, Err(Failure::Refused(Reason::OtherSession))), "{refused:?}");
+        }
+        drop(client);
+        thread.join().unwrap();
     }
 
     /// The MCU that has restarted knows neither the session nor the report.

@@ -34,8 +34,9 @@ struct Connection {
 
 impl Connection {
     fn order(&mut self, request: Request) -> Result<(&'static str, f64)> {
-        let (state, target) = self.client.command(request)?;
+        // Also of a refused one: an MCU that has restarted would get one with each turn.
         self.heard = Instant::now();
+        let (state, target) = self.client.command(request)?;
         Ok((state.name(), target.to_f64()))
     }
 
@@ -119,13 +120,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sends heartbeats until the port is closed; a lost connection is reported by the next call.
+/// Sends heartbeats until the port is closed, then disables the output; a lost connection is reported by the next call.
 fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
     while !closing.load(Ordering::Relaxed) {
         if let Some(connection) = lock(connection).as_mut() {
             let _ = connection.beat();
         }
         thread::park_timeout(TURN);
+    }
+    if let Some(connection) = lock(connection).as_mut() {
+        connection.client.leave();
     }
 }
 
@@ -240,7 +244,7 @@ impl Port {
         self.with(py, |it| it.settings(path))
     }
 
-    /// Ends the heartbeats and closes the port, without a word to the MCU.
+    /// Disables the output, ends the heartbeats and closes the port.
     fn close(&self, py: Python<'_>) {
         py.detach(|| {
             self.closing.store(true, Ordering::Relaxed);

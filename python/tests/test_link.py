@@ -2,6 +2,7 @@
 
 import os
 import re
+import threading
 import time
 
 import pytest
@@ -88,6 +89,30 @@ def test_a_schedule_is_recorded_from_its_first_row_on(board):
         assert link.status()["sample"]["target_v"] == 150
         with pytest.raises(vsj.BadInput, match="the controller's own estimate"):
             vsj.identify(frame)
+
+
+def test_a_recording_ends_with_an_error_when_the_output_is_disabled(board):
+    with vsj.Link(board, timeout=5) as link:
+        link.arm()
+        threading.Timer(0.5, link.disarm).start()
+        with pytest.raises(vsj.LinkError, match="no longer armed: the MCU is disarmed"):
+            link.record(schedule=[(0, 100), (60, 0)])
+        link.arm()
+        with pytest.raises(vsj.BadInput, match="expected 0 to 700 V"):
+            link.record(schedule=[(0, 100), (1, 5000), (2, 0)])
+
+
+@pytest.mark.parametrize("end", [vsj.Link.close, lambda link: None], ids=["closed", "deleted"])
+def test_the_output_is_disabled_when_the_link_ends(board, end):
+    link = vsj.Link(board, timeout=5)
+    link.arm()
+    link.set(300)
+    end(link)
+    del link
+    # Sooner than the silence limit of 1 s, after which the MCU would ramp down by itself.
+    time.sleep(0.3)
+    with vsj.Link(board, timeout=5) as link:
+        assert link.status()["state"] == "disarmed"
 
 
 def test_errors_of_requests_have_the_words_of_the_command(board, command):

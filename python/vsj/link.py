@@ -100,8 +100,8 @@ class Sample:
 class Link:
     """A connection to a running MCU, as of the command ``vsj link``.
 
-    While it is open, heartbeats are sent from a thread, so that the MCU does not take the host for silent. As a context manager it
-    disarms the MCU at the end, also after an exception. Calls wait without the interpreter's lock.
+    While it is open, heartbeats are sent from a thread, so that the MCU does not take the host for silent. The output is disabled when
+    it is closed or deleted; as a context manager it is closed at the end, also after an exception. Calls wait without the interpreter's lock.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class Link:
             self.close()
 
     def close(self) -> None:
-        """Close the port and end the heartbeats; an armed MCU then ramps down by itself."""
+        """Disable the output, end the heartbeats and close the port."""
         self._port.close()
 
     def status(self) -> Dict[str, Any]:
@@ -211,7 +211,7 @@ class Link:
             Rows per second; 115 200 bit/s suffice for about 250.
         schedule : sequence of (time_s, voltage_v), array of shape (n, 2) or frame of a :class:`Plan`, optional
             Targets that an armed MCU is commanded, each held until the next; times in s, increasing. The time of the last row is the
-            end, unless ``seconds`` is longer.
+            end, unless ``seconds`` is longer. A recording in which the MCU is disarmed or has a fault ends with ``LinkError``.
 
         Returns
         -------
@@ -226,18 +226,28 @@ class Link:
             if not waiting:
                 raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
             seconds = waiting[0][0]
-        has_sensor = self.status()["sample"]["measured_v"] is not None
+        status = self.status()
+        has_sensor = status["sample"]["measured_v"] is not None
+        lowest_v, highest_v = status["lowest_v"], status["highest_v"]
+        for _, voltage_v in waiting:
+            if not lowest_v <= voltage_v <= highest_v:
+                raise _vsj.BadInput(f"schedule: {voltage_v:g} V; expected {lowest_v:g} to {highest_v:g} V, what is in reach")
+        is_commanded = False
 
         def command(elapsed_s: float) -> None:
+            nonlocal is_commanded
             due = None
             while waiting and elapsed_s >= waiting[-1][0]:
                 due = waiting.pop()[1]
             if due is not None:
                 self.set(due)
+                is_commanded = True
 
         rows: List[Sample] = []
         for samples in self._turns(rate_hz, seconds, command):
             rows += samples
+            if is_commanded and samples and samples[-1].state not in ("armed", "ramping"):
+                raise _vsj.LinkError(f"no longer armed: the MCU is {samples[-1].state} at {samples[-1].time_s:g} s")
             if rows and samples and samples[-1].tick < rows[0].tick:
                 raise _vsj.LinkError("the MCU restarted during the recording")
         reading = "stiffness" if has_sensor or any(row.measured_v is not None for row in rows) else "estimate"

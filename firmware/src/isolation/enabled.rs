@@ -10,6 +10,9 @@ use model::{OutOfRange, Plant, SampleTime, ScaledStiffness, Validate, Volts, dev
 
 use crate::control::{Control, Tick};
 
+/// The state in which a command may acknowledge the bank's fault.
+const TRIPPED: State = State::Faulted(Fault::Isolation);
+
 /// Properties of the bank that are constant from the start on, in SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms {
@@ -100,6 +103,10 @@ struct Moment {
 pub struct Isolation {
     config: Option<isolation::Config>,
     trip_on_cause: Causes,
+    /// A cause of that setting was named; the fault stays until it is acknowledged, whatever the bank says then.
+    tripped: bool,
+    /// The command of this tick may acknowledge that fault.
+    acknowledging: bool,
     last: Option<Moment>,
     /// Verdict, age and number of decisions of the last news.
     reported: (Verdict, u32, u32),
@@ -116,6 +123,8 @@ impl Isolation {
     pub const NEW: Self = Self {
         config: None,
         trip_on_cause: Causes::NONE,
+        tripped: false,
+        acknowledging: false,
         last: None,
         reported: (Verdict::Quiet, 0, 0),
         state: isolation::State::NEW,
@@ -139,23 +148,22 @@ impl Isolation {
         }
     }
 
-    /// Before a tick: the acknowledgement of the bank's fault ends its alarm. Returns that fault as long as a cause of the setting
-    /// `trip_on_cause` is named.
+    /// Before a tick: returns the bank's fault after a cause of the setting `trip_on_cause` was named, until it is acknowledged; not in
+    /// the tick whose command may do so.
     #[inline]
     pub fn begin(&mut self, command: &Command, state: State) -> Option<Fault> {
-        if command.arming == Some(supervisor::Command::Disarm) && state == State::Faulted(Fault::Isolation) {
-            self.acknowledge();
-        }
-        match self.state.verdict() {
-            Verdict::Named(cause) if self.trip_on_cause.contains(cause) => Some(Fault::Isolation),
-            _ => None,
-        }
+        self.acknowledging = command.arming == Some(supervisor::Command::Disarm) && state == TRIPPED;
+        (self.tripped && !self.acknowledging).then_some(Fault::Isolation)
     }
 
     /// After the output of a tick is written: advances the bank. Returns what has changed. Bounded work, no float, no panic: not
     /// inlined, so that the audit of the image verifies it.
     #[inline(never)]
     pub fn tick(&mut self, control: &Control, tick: &Tick) -> Option<News> {
+        if core::mem::take(&mut self.acknowledging) && control.supervisor().state() != TRIPPED {
+            self.tripped = false;
+            self.state.acknowledge();
+        }
         let config = self.config.as_ref()?;
         let Tick { drive, output, measured } = tick;
         let now = Moment { applied: output.applied, model: control.uncorrected(output), enabled: drive.enabled() };
@@ -164,7 +172,9 @@ impl Isolation {
             let reading = measured.filter(|_| last.enabled).map(|volts| control.inward(ScaledStiffness(volts.0)));
             config.tick(&mut self.state, last.applied, last.model, reading);
         }
-        let says = (self.state.verdict(), self.state.since_blocks(), self.state.decisions());
+        let verdict = self.state.verdict();
+        self.tripped |= matches!(verdict, Verdict::Named(cause) if self.trip_on_cause.contains(cause));
+        let says = (verdict, self.state.since_blocks(), self.state.decisions());
         if says == self.reported {
             return None;
         }
@@ -174,7 +184,7 @@ impl Isolation {
         Some(News { report, since_ticks, before })
     }
 
-    /// Ends an alarm: the bank looks for a fault anew.
+    /// Ends an alarm: the bank looks for a fault anew. A fault of `trip_on_cause` stays.
     pub fn acknowledge(&mut self) {
         self.state.acknowledge();
     }

@@ -160,7 +160,34 @@ fn a_cause_of_the_trip_is_a_fault_until_it_is_acknowledged() {
             (command != disarm || state != faulted).then_some(Fault::Isolation)
         );
     }
-    assert_eq!(rig.isolation.begin(&arm, State::Disarmed), None, "the bank begins anew");
+    // Refused, because something else speaks against it: the control's state is still the fault.
+    let (refused, _) = rig.tick(None, 0.0);
+    assert_eq!(rig.isolation.begin(&disarm, faulted), None);
+    assert_eq!((rig.isolation.tick(&rig.control, &refused), rig.control.supervisor().state()), (None, faulted));
+    assert_eq!(rig.isolation.begin(&command(None), faulted), Some(Fault::Isolation));
+    let (_, news) = rig.tick(Some(supervisor::Command::Disarm), 0.0);
+    assert_eq!(rig.control.supervisor().state(), State::Disarmed);
+    assert_eq!(news.map(|news| news.report.verdict), Some(Verdict::Quiet), "the bank begins anew");
+    assert_eq!(rig.isolation.begin(&arm, State::Disarmed), None);
+}
+
+/// The acknowledgement of an alarm arrives between the tick that names a cause and the next one.
+#[test]
+fn the_end_of_an_alarm_is_no_end_of_the_trip() {
+    let mut rig = Rig::new(&settings(Causes::NONE.with(Cause::GainError)));
+    rig.run(0, CHANGES, |_, _, _, _| ());
+    rig.gain = 1.1;
+    let (mut named_at, mut fault_at) = (None, None);
+    rig.run(CHANGES, NAMED, |rig, tick, _, news| {
+        if news.is_some_and(|news| matches!(news.report.verdict, Verdict::Named(_))) {
+            named_at.get_or_insert(tick);
+            rig.isolation.acknowledge();
+        }
+        if rig.control.supervisor().state() == State::Faulted(Fault::Isolation) {
+            fault_at.get_or_insert(tick);
+        }
+    });
+    assert!(named_at.is_some() && fault_at == named_at.map(|tick| tick + 1), "{named_at:?} {fault_at:?}");
 }
 
 #[test]

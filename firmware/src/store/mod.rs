@@ -126,14 +126,11 @@ impl<P: Pages> Store<P> {
     }
 
     /// Whether the newest content of a block was sealed and is damaged now, so that an older one is valid, or none. After a power
-    /// cut in the last word of a page it cannot be known, and counts as damaged; an erased page and one of another program do not.
+    /// cut in the last word of a page, or while one is erased, it cannot be known, and may count as damaged; an erased page and one
+    /// of another program do not.
     pub fn is_damaged(&self, block: Block) -> bool {
         let newest = self.newest(block).map(|(id, _)| id.number);
-        let broken = |side| {
-            let page = self.pages.bytes(Page { block, side });
-            if open(block, page).is_some() { None } else { sealed_number(block, page) }
-        };
-        let broken = self.pages.tolerate_bit_errors(|| [Side::A, Side::B].map(broken));
+        let broken = [Side::A, Side::B].map(|side| self.broken(Page { block, side }));
         // A page with a smaller number is one whose erasure a power cut has interrupted.
         broken.into_iter().flatten().any(|number| newest.is_none_or(|newest| number == newest.wrapping_add(1)))
     }
@@ -161,7 +158,8 @@ impl<P: Pages> Store<P> {
         Ok(())
     }
 
-    /// Seals a block's new content if its payload is complete and `check` accepts it.
+    /// Seals a block's new content if its payload is complete and `check` accepts it. Damaged content in the other page is erased: it
+    /// could be newer by its number, and valid again if its weak bits read right.
     ///
     /// # Errors
     /// The [`Reason`] for rejecting the content; the old one remains valid.
@@ -188,9 +186,25 @@ impl<P: Pages> Store<P> {
         self.pages.program(page, 0, first).map_err(not_stored)?;
         self.pages.program(page, WORD, last).map_err(not_stored)?;
         match self.newest(block) {
-            Some((stored, _)) if stored == id => Ok(id),
+            Some((stored, _)) if stored == id => {
+                let other = self.unused(block);
+                if self.broken(other).is_some() {
+                    // The new content is valid whether or not this succeeds.
+                    let _ = self.pages.erase(other);
+                }
+                Ok(id)
+            }
             _ => Err(Reason::NotStored),
         }
+    }
+
+    /// The number of a page that was sealed and is damaged; `None` of any other.
+    fn broken(&self, page: Page) -> Option<u32> {
+        let bytes = self.pages.bytes(page);
+        self.pages.tolerate_bit_errors(|| match open(page.block, bytes) {
+            Some(_) => None,
+            None => sealed_number(page.block, bytes),
+        })
     }
 
     /// Number of the next part of `block`, 0 if the transfer is one of another block. The transfer ends.

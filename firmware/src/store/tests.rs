@@ -147,6 +147,26 @@ fn a_damaged_page_is_neither_valid_nor_taken_for_an_erased_one() {
     }
 }
 
+/// The page of the newest settings loses a bit while the other one is erased; what is stored then is number 1 again.
+#[test]
+fn settings_that_are_stored_after_damage_are_the_newest_for_good() {
+    for newest in [2, 4] {
+        let flash = (1..=newest).fold(Flash::BLANK, |flash, of| store_block(&flash, Settings, &payload(of), Ok(())).0);
+        let mut store = Store::new(flash);
+        store.part(Settings, 0, &[0; PART]).unwrap();
+        let sealed = Page { block: Settings, side: Side::B }.index();
+        let mut flash = store.pages;
+        flash.pages[sealed][HEADER] ^= 1;
+        assert!(is_damaged(&flash, Settings) && newest_block(&flash, Settings).is_none());
+        let (mut flash, stored) = store_block(&flash, Settings, &payload(9), Ok(()));
+        assert!(stored.is_ok() && !is_damaged(&flash, Settings), "{newest}");
+        // The bit reads right again.
+        flash.pages[sealed][HEADER] ^= 1;
+        assert_eq!(newest_block(&flash, Settings), Some(payload(9)), "{newest}");
+        assert!(!is_damaged(&flash, Settings), "{newest}");
+    }
+}
+
 #[test]
 fn the_model_with_the_highest_number_is_valid() {
     let mut flash = Flash::BLANK;

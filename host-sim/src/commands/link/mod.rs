@@ -180,11 +180,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::Status => session.show_status(),
         Command::Set(set) => {
+            let arms = set.arm && session.status.sample.state == link::State::Disarmed;
             if set.arm {
                 session.order(Request::Arm)?;
             }
-            let done = session.order(Request::Set(target))?;
-            session.show_and_keep(done, keep)
+            let done = session.order(Request::Set(target));
+            if done.is_err() && arms {
+                // What this command has armed does not stay so without the stiffness that it was armed for.
+                session.client.leave();
+            }
+            session.show_and_keep(done?, keep)
         }
         Command::Arm { .. } => {
             let done = session.order(Request::Arm)?;
