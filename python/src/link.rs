@@ -67,11 +67,12 @@ impl Connection {
         Ok(serde_json::to_string(&StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref()))?)
     }
 
-    fn models(&mut self, plant: Option<Plant>) -> Result<String> {
+    /// The models that run and are stored, and what of `plant`, which is sent, the MCU does not run.
+    fn models(&mut self, plant: Option<Plant>) -> Result<(String, Vec<String>)> {
         let (what, file) = match plant {
             None => {
                 let name = self.name();
-                return Ok(serde_json::to_string(&self.client.models().with_context(|| name)?)?);
+                return Ok((serde_json::to_string(&self.client.models().with_context(|| name)?)?, Vec::new()));
             }
             Some(Plant::Named(path)) => (path.clone(), plant_file::load(&path)?),
             Some(Plant::Text((name, text))) => (name.clone(), plant_file::parse(&name, &text)?),
@@ -80,7 +81,7 @@ impl Connection {
         let name = self.name();
         match self.client.install(&model) {
             Err(Failure::Refused(reason @ Reason::BadModel { .. })) => bad_input!("{what}: {reason}"),
-            answer => Ok(serde_json::to_string(&answer.with_context(|| name)?)?),
+            answer => Ok((serde_json::to_string(&answer.with_context(|| name)?)?, file.left_out())),
         }
     }
 
@@ -236,7 +237,7 @@ impl Port {
         })
     }
 
-    fn models(&self, py: Python<'_>, plant: Option<Plant>) -> PyResult<String> {
+    fn models(&self, py: Python<'_>, plant: Option<Plant>) -> PyResult<(String, Vec<String>)> {
         self.with(py, |it| it.models(plant))
     }
 

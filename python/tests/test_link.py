@@ -112,7 +112,7 @@ def test_the_output_is_disabled_when_the_link_ends(board, end):
     # Sooner than the silence limit of 1 s, after which the MCU would ramp down by itself.
     time.sleep(0.3)
     with vsj.Link(board, timeout=5) as link:
-        assert link.status()["state"] == "disarmed"
+        assert link.status()["sample"]["state"] == "disarmed"
 
 
 def test_errors_of_requests_have_the_words_of_the_command(board, command):
@@ -142,6 +142,10 @@ def test_model_and_settings_are_sent_checked_and_run(board, tmp_path):
     settings.write_text("schema = 1\n[gains]\nproportional = 3.5\n")
     with vsj.Link(board, timeout=5) as link:
         assert link.model()["active"]["number"] == 0
+        late = tmp_path / "late.toml"
+        late.write_text("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = [5.0]\n[amplifier]\ndelay_s = 0.01\n")
+        with pytest.warns(vsj.RecordWarning, match="not run by the MCU: amplifier.delay_s"):
+            assert link.model(late)["active"]["number"] == 1
         assert "proportional = 3.5" in link.settings(settings)["toml"]
         settings.write_text("schema = 1\n[gains]\nproportional = 1e9\n")
         with pytest.raises(vsj.BadInput, match="proportional"):

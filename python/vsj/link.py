@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _vsj
 from .analysis import named_plant
+from .records import warn
 
 
 @dataclass(frozen=True)
@@ -270,9 +271,11 @@ class Link:
         Parameters
         ----------
         plant : path or answer of :func:`vsj.identify` or :func:`vsj.diagnose`, optional
-            The model to send; ``"paper"`` for the built-in one.
+            The model to send; ``"paper"`` for the built-in one. What of it the MCU does not run is a ``RecordWarning``.
         """
-        return json.loads(self._port.models(None if plant is None else named_plant(plant)))
+        models, left_out = self._port.models(None if plant is None else named_plant(plant))
+        warn([f"not run by the MCU: {', '.join(left_out)}"] if left_out else [])
+        return json.loads(models)
 
     def settings(self, file: Optional[Union[str, "os.PathLike[str]"]] = None) -> Dict[str, Any]:
         """The settings that the MCU runs; with a settings file, send it to be checked and stored, and restart.
