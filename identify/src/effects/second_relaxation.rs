@@ -29,6 +29,8 @@ const BY_DECADES: usize = 2;
 const SPREAD: usize = 3;
 const ADDED: usize = 4;
 const ADDED_BY_DECADES: usize = 5;
+/// Part of a creep within the record from which on it is told from a gain.
+const LEAST_SEEN: f64 = 0.3;
 /// Largest creep that is added within the record's duration, relative to the nominal response.
 const MOST_ADDED: f64 = 3.0;
 /// Largest ratio of the parts of two decades.
@@ -47,6 +49,18 @@ impl Effect for SecondRelaxation {
 
     fn location(&self) -> Location {
         Location::Relaxation
+    }
+
+    /// Of creep that is much slower than the record hardly anything is seen: what is missing of it is a gain.
+    fn location_at(&self, form: usize, point: &[f64], data: &Data) -> Location {
+        let within = |tau_s: f64| -(-data.duration_s() / tau_s).exp_m1();
+        let slow_s = point[1].exp();
+        let seen = match form {
+            OF_THE_REST | OF_EVERYTHING => within(slow_s),
+            BY_DECADES => (within(0.1 * slow_s) + within(slow_s) + within(10.0 * slow_s)) / 3.0,
+            _ => 1.0,
+        };
+        if seen < LEAST_SEEN { Location::Static } else { self.location() }
     }
 
     fn description(&self) -> &'static str {

@@ -31,7 +31,7 @@ impl Evaluated {
     pub(super) fn price(&self, evaluator: &impl Evaluator, fit: &Fit) -> f64 {
         let blocks = &fit.model.blocks;
         let further = blocks.len().saturating_sub(1) as f64;
-        let stages: HashSet<Location> = blocks.iter().map(|(block, _)| block.effect().location()).collect();
+        let stages: HashSet<Location> = blocks.iter().map(|(block, point)| evaluator.location(block, point)).collect();
         let times = further + SAME_STAGE.get() * (blocks.len() - stages.len()) as f64;
         let misfit = if times > 0.0 { evaluator.misfit(fit, times, self.floor_v) } else { 0.0 };
         misfit + self.penalty_factor * blocks.iter().map(|(block, _)| evaluator.price(block)).sum::<f64>()

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use crate::adequacy;
 use crate::effects::EFFECTS;
-use crate::effects::effect::FitContext;
+use crate::effects::effect::{FitContext, Location};
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
@@ -72,6 +72,11 @@ pub trait Evaluator {
 
     /// Price of a block, in nats.
     fn price(&self, block: &Block) -> f64;
+
+    /// The stage of the chain that a block changes at a point.
+    fn location(&self, block: &Block, _point: &[f64]) -> Location {
+        block.effect().location()
+    }
 
     /// True if a block at a point cannot be distinguished from another cause, whose name it must not take.
     fn is_another_cause(&self, _block: &Block, _point: &[f64]) -> bool {
@@ -168,6 +173,10 @@ impl Evaluator for Engine<'_> {
             + PRICE_OF_COORDINATE.get() * fitted as f64
             + effect.ln_candidates(block.form, self.data)
             + (forms as f64).ln()
+    }
+
+    fn location(&self, block: &Block, point: &[f64]) -> Location {
+        block.effect().location_at(block.form, point, self.data)
     }
 
     fn is_another_cause(&self, block: &Block, point: &[f64]) -> bool {

@@ -87,7 +87,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// Tries the forms that are seldom needed, with the work that was kept for them: for the best structure's causes, alone, in
-    /// addition to it, and in place of each of its blocks; then extends what was found as usual.
+    /// addition to it, and in place of each of its blocks; then exchanges and extends what was found as usual.
     fn with_rare_forms(&mut self, best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         self.evaluator.begin_rare_forms();
         let common = best.fit.model.structure();
@@ -108,6 +108,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
             return best;
         }
         progress(&best);
+        // The other causes may have stood in for what the common forms of this one could not do.
+        let best = self.settled(best);
         self.extended_greedily(best, progress)
     }
 
