@@ -119,3 +119,36 @@ fn a_hardening_spring_is_a_static_nonlinearity_with_its_settled_curve() {
         assert!(parameter.high - parameter.low < 0.03, "{name}: {parameter:?}");
     }
 }
+
+/// Fewer readings than a model with a time constant takes: anything could stand in for the response.
+#[test]
+fn no_cause_is_found_in_fewer_readings_than_a_time_constant_takes() {
+    let lag: Rates = |u, [x, _]| [(u - x) / 0.8, 0.0];
+    for readings in [8, 10, 14] {
+        let mut record = record(lag, |_, [x, _]| x, [1.0, 2.0]);
+        record.rows = record.rows.split_off(23).into_iter().step_by(8).take(readings).collect();
+        let identified = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+        let options = Options::default().judging(identified).unwrap();
+        let report = examine(&record, &options, |_| ()).unwrap().report;
+        assert_eq!((report.verdict, report.findings.len()), (Verdict::Insufficient, 0), "{report:#?}");
+    }
+}
+
+/// A dead zone beyond which the gain is the nominal one lowers the static gain; so does creep that is far slower than the record, which
+/// is not there.
+#[test]
+fn a_dead_zone_under_the_plant_file_of_the_same_device_is_a_gain_and_a_law() {
+    let nominal: Rates = |u, [x, _]| [(u - x) / 0.4, 0.0];
+    let dead: Rates = |u, [x, _]| [(u.signum() * (u.abs() - 0.5).max(0.0) - x) / 0.4, 0.0];
+    let [clean, changed] = [nominal, dead].map(|rates| record(rates, |_, [x, _]| 2.0 * x, [-4.0, 4.0]));
+    let plant = identify(&[clean], Input::Hold, &Units::default()).unwrap().plant;
+    let options = Options::default().judging_file("device", plant).unwrap();
+    let report = examine(&changed, &options, |_| ()).unwrap().report;
+    let mut causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    assert_eq!(
+        (report.verdict, &causes[..]),
+        (Verdict::Explained, &["gain-error", "static-nonlinearity"][..]),
+        "{report:#?}"
+    );
+}

@@ -36,7 +36,10 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
                 }
                 Some(Step::Update(block, update)) => {
                     let result = shared_store::update(block, update).await;
-                    send(line, server.updated(block, result, &view)).await;
+                    // Erasing a page takes many ticks.
+                    let after = with_mailbox(|mailbox| mailbox.view()).unwrap_or(view);
+                    report_faults(line, server, &after).await;
+                    send(line, server.updated(block, result, &after)).await;
                 }
                 Some(Step::ReadSettings { built_in, number }) => {
                     let part = shared_store::settings_part(built_in, number).await;

@@ -36,6 +36,11 @@ impl Effect for ChargeLeakage {
         Location::Relaxation
     }
 
+    /// A loss that is over before the response has settled only lowers the settled value: it is a gain.
+    fn location_at(&self, _: usize, point: &[f64], _: &Data) -> Location {
+        if point[1].exp() < REFERENCE_TIME_CONSTANT_S { Location::Static } else { self.location() }
+    }
+
     fn description(&self) -> &'static str {
         "stiffness falls back while the voltage stays"
     }

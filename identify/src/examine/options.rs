@@ -35,6 +35,9 @@ pub struct Options {
     /// True if so few readings were identified that no model with a time constant was tried: that the simulation agrees with them says
     /// nothing.
     pub without_dynamics: bool,
+    /// True if the identified spring may have no static gain, and a fit to the first 60 % of the readings does not predict the others:
+    /// that the simulation agrees with all of them says nothing.
+    pub unpredictive: bool,
     /// How long causes are searched for.
     pub effort: Effort,
     /// The best linear model of the records, if it is known; it is fitted otherwise.
@@ -59,10 +62,21 @@ impl Options {
     pub fn judging(self, identified: Identified) -> Result<Self> {
         let Identified { report, plant, simpler, settled, decays, linear, .. } = identified;
         let (held_out_rmse, without_dynamics) = (Some(report.held_out_rmse), report.linear.is_empty());
+        let unpredictive = report.is_unpredictive();
         let simpler = simpler.map(Base::new).transpose()?;
         let unsettled = !settled;
-        Self { unsettled, identified: true, decays, simpler, held_out_rmse, without_dynamics, linear, ..self }
-            .judging_file("identify", plant)
+        Self {
+            unsettled,
+            identified: true,
+            decays,
+            simpler,
+            held_out_rmse,
+            without_dynamics,
+            unpredictive,
+            linear,
+            ..self
+        }
+        .judging_file("identify", plant)
     }
 
     /// Returns the options with a simulation that stays as it was given or identified.
@@ -97,6 +111,7 @@ impl Default for Options {
             simpler: None,
             held_out_rmse: None,
             without_dynamics: false,
+            unpredictive: false,
             effort: Effort::Normal,
             linear: None,
             stop: Stop::default(),

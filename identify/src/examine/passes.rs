@@ -65,14 +65,17 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let held = held(record);
     let informative = informative(record, held.as_ref());
     let records = std::slice::from_ref(&*informative);
-    let mut found = joint(records, options, None, &mut progress)?.with_rivals(records, options);
+    // Without a model of the response any cause could stand in for it.
+    let only = options.without_dynamics.then_some(&[][..]);
+    let mut found = joint(records, options, only, &mut progress)?.with_rivals(records, options);
     let linear = linear(records, options);
     found.report.linear = linear.as_ref().map(|linear| linear.error);
     // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
     let judge = linear.as_ref().filter(|_| !reports_changes(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
-    if options.without_dynamics && found.report.verdict == Verdict::Consistent {
+    let says_nothing = options.unpredictive && found.report.verdict == Verdict::Consistent;
+    if options.without_dynamics || says_nothing {
         found.report.verdict = Verdict::Insufficient;
         found.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
     }
@@ -325,7 +328,10 @@ fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress
 /// score(best causes without the part) > score(best causes) + CLEARLY_LIKELIER
 /// ```
 fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    let Some(mut warm_start) = found.warm_start.clone() else { return found };
+    // All parts of an identified spring are of the record itself.
+    let Some(mut warm_start) = found.warm_start.clone().filter(|_| !record.data.normalisation.identified) else {
+        return found;
+    };
     let (mut score, mut base) = (found.score, base.clone());
     let mut unsupported_terms = Vec::new();
     while !record.budget.is_over() {

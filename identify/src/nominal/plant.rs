@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use simulation::plant_file::{Amplifier, Law, Mode, PlantFile, Reading, Relaxation};
 use simulation::units::{UnitNames, Units};
 
-use crate::nominal::report::{InputLaw, Nominal, Oscillation};
+use crate::nominal::report::{InputLaw, Nominal, Oscillation, Quantity};
 
 /// Largest damping ratio of an oscillation in a plant file.
 const MOST_DAMPED: f64 = 1.0 - 1e-6;
@@ -29,6 +29,14 @@ fn square(full_scale_v: f64) -> Law {
     Law { voltage_v, stiffness }
 }
 
+/// The instantaneous share: 0 or 1 where that is within the interval of one that is beyond, which no instantaneous response can have
+/// and a controller cannot use.
+fn whole_share(nominal: &Nominal) -> f64 {
+    let Quantity { value, low, high, .. } = nominal.share;
+    let limits = [(value < 0.0 && high >= 0.0, 0.0), (value > 1.0 && low <= 1.0, 1.0)];
+    limits.into_iter().find_map(|(applies, limit)| applies.then_some(limit)).unwrap_or(value)
+}
+
 /// The plant file. `spacing_s` stands in for the time constant of a spring that has neither a time constant nor an oscillation.
 pub(super) fn plant_file(
     nominal: &Nominal,
@@ -38,7 +46,7 @@ pub(super) fn plant_file(
     units: &Units,
     spacing_s: f64,
 ) -> PlantFile {
-    let share = nominal.share.value;
+    let share = whole_share(nominal);
     let mut tau_s: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.tau.value).collect();
     let mut weights: Vec<f64> = nominal.tau_s.iter().map(|lag| lag.weight.value).collect();
     let mode = |of: &Oscillation| Mode {

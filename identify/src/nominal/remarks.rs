@@ -105,7 +105,7 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         remarks
             .push(format!("A parameter is on its bound, {bound} that is searched; its interval is not to be trusted."));
     }
-    if !(0.0..=1.0).contains(&nominal.share.value) && report.order > 0 {
+    if (nominal.share.high < 0.0 || nominal.share.low > 1.0) && report.order > 0 {
         remarks.push(format!(
             "The instantaneous share {} is outside of 0 to 1: the first response goes {}.",
             significant(nominal.share.value, 4),

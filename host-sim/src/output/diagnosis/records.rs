@@ -7,7 +7,7 @@ use identify::dimension::Dimension;
 use identify::record::scales::Scales;
 use maud::{Markup, html};
 
-use crate::output::diagnosis::number::{interval, number};
+use crate::output::diagnosis::number::{interval, number, shown_name};
 use crate::output::diagnosis::tables;
 use crate::output::page::{Row, Table};
 
@@ -69,8 +69,9 @@ pub(super) fn section(records: &[RecordReport], scales: &Scales) -> Markup {
 /// The findings of one record, each as `cause (parameters)`, and structure that no cause explains; `none` without any.
 fn only(of: &RecordReport, scales: &Scales) -> Vec<String> {
     let parameters = |finding: &Finding| {
-        let each =
-            finding.parameters.iter().map(|(name, parameter)| format!("{name} = {}", interval(parameter, scales)));
+        let each = finding.parameters.iter().map(|(name, parameter)| {
+            format!("{} = {}", shown_name(name, parameter.dimension, scales), interval(parameter, scales))
+        });
         each.collect::<Vec<_>>().join(", ")
     };
     let faults = of.findings.iter().map(|finding| format!("{} ({})", finding.cause, parameters(finding)));

@@ -19,6 +19,8 @@ const SMALLEST_IMPROVEMENT: f64 = 0.005;
 /// Ratio of the held-out errors of the extended simulation and of the best linear model from which on the nominal spring is another
 /// one than that of the record.
 const ANOTHER_SPRING: f64 = 2.0;
+/// Ratio of the errors of the simulation and of its extension up to which the simulation may be right.
+const HARDLY_LARGER: f64 = 1.1;
 
 /// The text for the terminal.
 pub fn text(name: &str, report: &answer::Report, scales: &Scales) -> String {
@@ -233,6 +235,11 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             "{name} cannot decide whether the simulation is wrong: its {rows} readings have too little excitation{}.",
             margins.map_or_else(String::new, |off| format!("; {off} could remain undetected"))
         ),
+        Verdict::Ambiguous if causes.is_empty() => {
+            format!(
+                "The simulation agrees with {name} together, but more than one answer fits what single records show."
+            )
+        }
         Verdict::Unexplained if causes.is_empty() => {
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
@@ -287,7 +294,9 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         ));
     }
     if !report.alternatives.is_empty() {
-        let nothing = || "no error at all".to_owned();
+        let is_right = report.baseline.rmse <= HARDLY_LARGER * report.extended.quality.rmse;
+        let nothing =
+            || if is_right { "no error at all".to_owned() } else { "a law that no cause describes".to_owned() };
         let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
         sentences.push(format!("Alternatives that the data cannot reject: {}.", rivals.collect::<Vec<_>>().join("; ")));
         let unlikely = report.findings.iter().filter(|finding| !finding.is_likely()).map(|finding| finding.cause);
