@@ -46,6 +46,8 @@ pub struct UnmodelledDynamics {
     pub share: f64,
     /// Root mean square of the structure, in V.
     pub rms: f64,
+    /// True if the tested residual is whitened: what one reading adds to those before it.
+    pub whitened: bool,
     /// True if noise alone reaches the check's statistic too often to rule it out, but the search should go on: in one of
     /// fifteen records, and in every record that is too short for the regression.
     pub doubtful: bool,
@@ -57,7 +59,12 @@ pub struct UnmodelledDynamics {
 impl UnmodelledDynamics {
     /// Structure that is certain: doubtful and significant.
     pub(crate) fn certain(place: String, share: f64, rms: f64) -> Self {
-        Self { place, share, rms, doubtful: true, significant: true }
+        Self { place, share, rms, whitened: false, doubtful: true, significant: true }
+    }
+
+    /// The same in a whitened residual.
+    pub(crate) fn certain_in_whitened(place: String, share: f64, rms: f64) -> Self {
+        Self { whitened: true, ..Self::certain(place, share, rms) }
     }
 }
 

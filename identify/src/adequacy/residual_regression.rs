@@ -86,6 +86,7 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
         // Structure below the rounding error does not count.
         share: if fit.noise.half_step > 0.0 { share.min((rms / fit.noise.half_step).powi(2) * 3.0) } else { share },
         rms,
+        whitened: true,
         significant: z > Z_RARE,
         doubtful: z > Z_DOUBTFUL,
     };
@@ -105,6 +106,7 @@ fn serial_correlation(engine: &Engine, fit: &Fit) -> UnmodelledDynamics {
         place: "correlation of successive errors".to_owned() + &Localisation::new(engine.data, errors).words(),
         share,
         rms: share.max(0.0).sqrt() * (squares / rows).sqrt(),
+        whitened: true,
         significant: share * rows.sqrt() > Z_SHORT_RECORD,
         doubtful: true,
     }
@@ -121,7 +123,7 @@ fn spectral_line(data: &Data, fit: &Fit, target: &[f64], found: UnmodelledDynami
     // Half as many lines as rows are searched.
     if power - (data.rows() as f64 / 2.0).ln() > LINE_NATS && share > found.share {
         let place = format!("at a frequency of {}", data.scales().shown(Dimension::Frequency, peak.frequency_hz, 3));
-        return UnmodelledDynamics::certain(place, share, share.sqrt() * fit.noise.sigma);
+        return UnmodelledDynamics::certain_in_whitened(place, share, share.sqrt() * fit.noise.sigma);
     }
     found
 }

@@ -61,7 +61,8 @@ pub(crate) fn spikes(engine: &Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     // Compared with the innovations, because the autoregression may have been fitted to follow each spike.
     let of_far = dot(&far_ones, &far_ones);
     let place = place + &Localisation::new(data, &far_ones).words();
-    Some(UnmodelledDynamics::certain(place, of_far / dot(&white, &white), (of_far / white.len() as f64).sqrt()))
+    let (share, rms) = (of_far / dot(&white, &white), (of_far / white.len() as f64).sqrt());
+    Some(UnmodelledDynamics::certain_in_whitened(place, share, rms))
 }
 
 /// Number of far rows just after a change of the voltage, if it is significant.

@@ -90,11 +90,11 @@ pub(super) fn places(problem: &Problem, fit: &Fit) -> Quantity {
 }
 
 /// The least and the largest of each quantity, in the order of [`Canonical::values`], with the delays of the fit's place, which all
-/// fit alike. Of whole rows it is only the last one: the quantities are those of a spring that is late by whole rows.
+/// fit alike.
 pub(super) fn within_place_of_delay(problem: &Problem, fit: &Fit, canonical: &Canonical) -> Vec<(f64, f64)> {
     let mut reach: Vec<(f64, f64)> =
         canonical.values(canonical).into_iter().flatten().map(|value| (value, value)).collect();
-    if !problem.bounds.held || problem.bounds.whole_rows {
+    if !problem.bounds.held {
         return reach;
     }
     let (above, up_to) = problem.place_of_delay(fit.poles.delay);

@@ -109,7 +109,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     }
     let held_out_in_place = engine.held_out_residual_in_place(extended);
     let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V.get());
-    let left = || unmodelled.as_ref().map(|found| sentence(found, data.scales()));
+    let left = || unmodelled.as_ref().map(|found| sentence(found, extended, data.scales()));
     let spoiling = spoiling(engine, &found);
     let unfinished = engine.budget().was_cut() && adequacy::doubts(engine, extended);
     let before = quality(engine, &baseline, &held_out[0], false);
@@ -262,9 +262,12 @@ const UNEARNED: &str =
 const LACKING: &str = "Further linear dynamics explain part of the error, but the nominal spring was identified from these readings: they are part of it, or take the place of a cause that no model describes";
 
 /// The report's sentence on unmodelled dynamics.
-fn sentence(UnmodelledDynamics { place, share, rms, .. }: &UnmodelledDynamics, scales: &Scales) -> String {
+fn sentence(found: &UnmodelledDynamics, extended: &Fit, scales: &Scales) -> String {
+    let UnmodelledDynamics { place, share, rms, whitened, .. } = found;
     let rms = scales.shown_in_four_digits(Dimension::ReadingSize, *rms);
-    format!("{:.1} % of the residual ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
+    let one_step = *whitened && !extended.noise.autocorrelation.is_white();
+    let of = if one_step { "the one-step error" } else { "the residual" };
+    format!("{:.1} % of {of} ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
 }
 
 /// Reports a record that identifies no spring.
