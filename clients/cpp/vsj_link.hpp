@@ -498,17 +498,18 @@ private:
         if (error != 0) cannot_open(::gai_strerror(error));
         const std::unique_ptr<addrinfo, void (*)(addrinfo*)> all(found, ::freeaddrinfo);
         // A name may stand for several addresses, of which not all are listened on.
+        const auto until = Clock::now() + timeout;
         for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
             try {
                 file_ = ::socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
                 if (file_ < 0) cannot_open(std::strerror(errno));
                 const int now = 1;
                 ::setsockopt(file_, IPPROTO_TCP, TCP_NODELAY, &now, sizeof now);
-                return connect(at->ai_addr, at->ai_addrlen, timeout);
+                return connect(at->ai_addr, at->ai_addrlen, std::max(until - Clock::now(), Clock::duration::zero()));
             } catch (const Error&) {
-                if (at->ai_next == nullptr) throw;
                 if (file_ >= 0) ::close(file_);
                 file_ = -1;
+                if (at->ai_next == nullptr) throw;
             }
         }
     }

@@ -140,11 +140,17 @@ impl Client {
         Ok(self.samples.drain(..))
     }
 
-    /// Disables the output before the connection ends, without waiting long for an answer.
+    /// Disables the output before the connection ends, without waiting long for an answer; not that of an MCU which another program
+    /// commands by now.
     pub fn leave(&mut self) {
         self.patience = Patience::of(LEAVING);
-        // Without its host the MCU ramps down by itself.
-        let _ = self.exchange(Request::Disarm);
+        if !matches!(
+            self.exchange(Request::Heartbeat),
+            Err(Failure::Refused(Reason::OtherSession | Reason::HelloFirst))
+        ) {
+            // Without its host the MCU ramps down by itself.
+            let _ = self.exchange(Request::Disarm);
+        }
     }
 
     /// Asks for a new session; the next request begins it.

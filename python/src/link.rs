@@ -261,5 +261,10 @@ impl Port {
 impl Drop for Port {
     fn drop(&mut self) {
         self.closing.store(true, Ordering::Relaxed);
+        // The thread never waits for the interpreter.
+        if let Some(beating) = lock(&self.beating).take() {
+            beating.thread().unpark();
+            let _ = beating.join();
+        }
     }
 }

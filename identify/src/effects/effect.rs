@@ -148,7 +148,7 @@ pub trait Effect: Sync {
     }
 
     /// Returns the stage of the chain that the effect changes at a point, as far as the record can tell: where its own stage responds too
-    /// slowly to be seen, it changes the static response.
+    /// slowly or too quickly to be seen, it changes the static response.
     fn location_at(&self, _form: usize, _point: &[f64], _data: &Data) -> Location {
         self.location()
     }

@@ -4,6 +4,7 @@ use anyhow::Result;
 use simulation::plant_file::PlantFile;
 use simulation::units::Units;
 
+use crate::answer::Verdict;
 use crate::fit::budget::Effort;
 use crate::fit::stop::Stop;
 use crate::nominal::{BestLinear, Identified};
@@ -77,6 +78,16 @@ impl Options {
             ..self
         }
         .judging_file("identify", plant)
+    }
+
+    /// Returns the causes that are searched, `None` for all: none without a model of the response, which any could stand in for.
+    pub(super) fn causes(&self) -> Option<&'static [&'static str]> {
+        self.without_dynamics.then_some(&[])
+    }
+
+    /// True if a verdict on the identified spring says nothing of the record.
+    pub(super) fn says_nothing(&self, verdict: Verdict) -> bool {
+        self.without_dynamics || self.unpredictive && verdict == Verdict::Consistent
     }
 
     /// Returns the options with a simulation that stays as it was given or identified.

@@ -6,7 +6,7 @@
 //! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
 //! | `with_missing_codes` | which, if a missing code is read as one of its neighbours? | if codes are missing | if that code is always the same one |
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
-//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
+//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run, not of an identified spring | if clearly likelier |
 //!
 //! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a
 //! `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that is higher by
@@ -65,17 +65,14 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let held = held(record);
     let informative = informative(record, held.as_ref());
     let records = std::slice::from_ref(&*informative);
-    // Without a model of the response any cause could stand in for it.
-    let only = options.without_dynamics.then_some(&[][..]);
-    let mut found = joint(records, options, only, &mut progress)?.with_rivals(records, options);
+    let mut found = joint(records, options, options.causes(), &mut progress)?.with_rivals(records, options);
     let linear = linear(records, options);
     found.report.linear = linear.as_ref().map(|linear| linear.error);
     // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
     let judge = linear.as_ref().filter(|_| !reports_changes(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
-    let says_nothing = options.unpredictive && found.report.verdict == Verdict::Consistent;
-    if options.without_dynamics || says_nothing {
+    if options.says_nothing(found.report.verdict) {
         found.report.verdict = Verdict::Insufficient;
         found.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
     }

@@ -57,13 +57,15 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone = joint(record, options, None, &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        let alone =
+            joint(record, options, options.causes(), &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
         shown.extend(alone.found.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
     let mut joint = joint(records, options, Some(&shown), &mut progress)?;
     let all: Vec<&'static str> =
         EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
+    let all = options.causes().map_or(all, <[_]>::to_vec);
     let weak = self::joint(records, options, Some(&all), &mut progress)?;
     let clearly_likelier = weak.found.score > joint.found.score + CLEARLY_LIKELIER;
     if clearly_likelier && predicts_most_records_better(&weak.found, &joint.found) {
@@ -85,7 +87,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         let mut from = |offset: f64| {
             let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
             let from_zero = std::slice::from_ref(&from_zero);
-            let alone = self::joint(from_zero, &options, None, &mut |of| progress(&format!("{}: {of}", record.name)))?;
+            let alone = self::joint(from_zero, &options, options.causes(), &mut |of| {
+                progress(&format!("{}: {of}", record.name))
+            })?;
             anyhow::Ok(alone.without_rivals(from_zero))
         };
         let mut alone = from(offset)?;
@@ -110,6 +114,10 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
     }
     (joint.report.verdict, joint.report.rows) = (verdict, rows);
+    if options.says_nothing(verdict) {
+        joint.report.verdict = Verdict::Insufficient;
+        joint.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
+    }
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }

@@ -66,7 +66,7 @@ pub struct Bounds {
     /// True if the voltage is held between rows: as long as no reading changes its place between the delayed steps, a longer delay has
     /// the same effect on the readings as another numerator, so that one delay of each [`Problem::place_of_delay`] is searched.
     pub held: bool,
-    /// True if these places are whole rows: the voltage is held over equal rows.
+    /// True if these places are whole rows: the voltage is held, and all times are multiples of one interval.
     pub whole_rows: bool,
 }
 
@@ -146,7 +146,7 @@ impl Fit {
     }
 
     /// All parameters in the order of the basis: those of each record, their shifts, then instantaneous part and numerators, then, of a
-    /// linearised fit, the logarithms of the sections' parameters and the delay in spacings.
+    /// linearised fit, the logarithms of the sections' parameters and, unless the voltage is held, the delay in spacings.
     pub fn parameters(&self, problem: &Problem) -> Vec<f64> {
         let searched = self.basis.count() - self.coefficients.len();
         let logarithms = self.poles.sections.iter().flat_map(|section| section.logarithms());

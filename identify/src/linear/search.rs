@@ -29,6 +29,8 @@ const STEPS: (usize, usize) = (5, 25);
 const MOST_DELAY_JUMPS: usize = 10;
 /// Shortest step of a delay in uneven rows, in spacings of the rows.
 const LEAST_DELAY_STEP: f64 = 0.01;
+/// Most steps towards the place of a delay in all rows from that in a part of them.
+const MOST_STEPS_TO_PLACE: usize = 40;
 /// Places of the delay on both sides that are tried next in uneven rows.
 const PLACES_NEAR: usize = 3;
 /// Most steps on all rows of a record of which only a part was searched, and the relative reduction of the cost below which they
@@ -234,7 +236,10 @@ fn settled(problem: &Problem, part: &Problem, poles: Poles) -> Poles {
         let better = near.into_iter().next().filter(|(there, _)| *there < cost);
         better.map(|(there, poles)| (cost, *best) = (there, poles)).is_some()
     };
-    while step > width(problem.place_of_delay(best.delay)) {
+    for _ in 0..MOST_STEPS_TO_PLACE {
+        if step <= width(problem.place_of_delay(best.delay)) {
+            break;
+        }
         if !jump(&[best.delay - step, best.delay + step], &mut best) {
             step *= 0.5;
         }

@@ -40,7 +40,7 @@ pub struct Series {
     pub reading: Vec<f64>,
     /// The fold in which each reading is held out if the record is the only one.
     pub fold: Vec<u8>,
-    /// Median time between rows.
+    /// Interval of the times if they are multiples of one, else the median time between rows.
     pub spacing: f64,
     /// True if the voltage is held between rows.
     pub held: bool,
@@ -156,7 +156,15 @@ impl Series {
                 0.0 => piece.slope.signum(),
                 from => from.signum(),
             };
-            rectified.pieces.push(Piece { start: piece.start, from: piece.from.abs(), slope: sign * piece.slope });
+            let of = Piece { start: piece.start, from: piece.from.abs(), slope: sign * piece.slope };
+            // A step to the voltage of the other sign is none.
+            if rectified
+                .pieces
+                .last()
+                .is_none_or(|last| (last.from, last.slope) != (of.from, of.slope) || of.slope != 0.0)
+            {
+                rectified.pieces.push(of);
+            }
             let zero = piece.start - piece.from / piece.slope;
             if piece.slope != 0.0 && piece.start < zero && zero < end {
                 rectified.pieces.push(Piece { start: zero, from: 0.0, slope: piece.slope.abs() });
@@ -205,14 +213,20 @@ impl Series {
 
     /// The delays with which every reading keeps its place between the starts of the pieces: those above the first, up to the second.
     pub(super) fn place_of_delay(&self, delay: f64) -> (f64, f64) {
-        let later = self.pieces.iter().skip(1).map(|piece| piece.start);
-        later.fold((f64::NEG_INFINITY, f64::INFINITY), |(above, up_to), start| {
+        let (mut above, mut up_to, mut next) = (f64::NEG_INFINITY, f64::INFINITY, 0);
+        for start in self.pieces.iter().skip(1).map(|piece| piece.start) {
             // A reading is taken just after a step that coincides with it.
-            let after = self.time.partition_point(|time| *time < start + delay - SAME * self.spacing);
-            let before = after.checked_sub(1).map_or(f64::NEG_INFINITY, |row| self.time[row] - start);
-            let next = self.time.get(after).map_or(f64::INFINITY, |time| time - start);
-            (above.max(before), up_to.min(next))
-        })
+            while self.time.get(next).is_some_and(|time| *time < start + delay - SAME * self.spacing) {
+                next += 1;
+            }
+            if next > 0 {
+                above = above.max(self.time[next - 1] - start);
+            }
+            if let Some(time) = self.time.get(next) {
+                up_to = up_to.min(time - start);
+            }
+        }
+        (above, up_to)
     }
 
     pub(super) fn pieces(&self) -> &[Piece] {

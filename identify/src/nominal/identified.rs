@@ -8,7 +8,7 @@ use crate::answer::SCHEMA;
 use crate::linear::{Section, Series};
 use crate::nominal::canonical::Canonical;
 use crate::nominal::covariance::Spectrum;
-use crate::nominal::intervals::{deviations, directions, not_negative, places, positive, within_place_of_delay};
+use crate::nominal::intervals::{deviations, directions, not_negative, over_places, places, positive};
 use crate::nominal::models::{BestLinear, Model, Models, scatter};
 use crate::nominal::plant::{self, VoltageRange};
 use crate::nominal::remarks;
@@ -69,7 +69,8 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     let spectrum = Spectrum::of(&fit.residual, problem.starts(), &directions(problem, fit));
     let canonical = Canonical::of(problem, fit);
     let deviations = deviations(problem, fit, &canonical, &spectrum);
-    let mut reach = deviations.into_iter().zip(within_place_of_delay(problem, fit, &canonical));
+    let places = problem.bounds.held.then(|| places(problem, fit));
+    let mut reach = deviations.into_iter().zip(over_places(problem, fit, &canonical, places.as_ref()));
     let base = if units.voltage.si == 1.0 { units.voltage.name.as_str() } else { "V" };
     let reading = units.reading.as_str();
     let mut quantity = |value: f64, unit: &str| {
@@ -99,7 +100,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     let zeros: Vec<Quantity> = canonical.zeros.iter().map(|&zero| quantity(zero, reading)).collect();
     let offsets: Vec<Quantity> = canonical.starts.iter().map(|&start| quantity(start, reading)).collect();
     tau_s.sort_by(|a, b| b.weight.value.abs().total_cmp(&a.weight.value.abs()));
-    let delay_s = if problem.bounds.held { places(problem, fit) } else { not_negative(delay) };
+    let delay_s = places.unwrap_or_else(|| not_negative(delay));
     let nominal = Nominal { gain, zero: zeros[0].clone(), share, delay_s, tau_s };
     let start = records
         .iter()

@@ -12,6 +12,11 @@ use crate::stats::thresholds::probability::Z;
 const DIFFERENCE: f64 = 1e-2;
 /// Ratio to the value from which a bound says nothing.
 const UNKNOWN: f64 = 1e6;
+/// Most whole rows of delay that are tried on both sides.
+const MOST_ROWS: u32 = 4;
+/// Shortest step from a place of the delay to others that fit, in spacings of the rows, and most of these steps.
+const SHORTEST_REACH: f64 = 1e-3;
+const MOST_REACHES: usize = 30;
 /// Records with more readings lose a negligible part of the errors to the fit.
 const LONG: usize = 20_000;
 
@@ -66,41 +71,61 @@ pub(super) fn not_negative(quantity: Quantity) -> Quantity {
 
 /// The delay under a voltage that is held: all places of it whose fit is not significantly worse, from end to end.
 pub(super) fn places(problem: &Problem, fit: &Fit) -> Quantity {
-    const MOST: usize = 4;
     let neighbours = Spectrum::neighbours(&fit.residual).clamp(0.0, 0.95);
     let degrees = problem.rows().saturating_sub(fit.degrees()).max(1) as f64;
-    let tolerated = Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
+    let tolerated = fit.cost + Z * Z * fit.cost / degrees * (1.0 + neighbours) / (1.0 - neighbours);
     let (least, most) = problem.bounds.delay;
-    let fits = |(above, up_to): (f64, f64)| {
-        let poles = Poles {
-            delay: if problem.bounds.whole_rows { up_to } else { 0.5 * (above.max(least) + up_to) },
-            ..fit.poles.clone()
-        };
-        up_to >= least && up_to <= most && problem.refined(poles, steps(problem), REFIT.1).cost <= fit.cost + tolerated
-    };
-    let beyond = SAME_PLACE * problem.spacing;
     let own = problem.place_of_delay(fit.poles.delay);
-    let reach = |next: &dyn Fn((f64, f64)) -> f64| {
-        let further = std::iter::successors(Some(own), |place| Some(problem.place_of_delay(next(*place)))).skip(1);
-        further.take(MOST).take_while(|place| fits(*place)).last().unwrap_or(own)
+    let at = |delay: f64| Poles { delay, ..fit.poles.clone() };
+    let (low, high) = if problem.bounds.whole_rows {
+        let fits = |rows: f64| {
+            let delay = fit.poles.delay + rows * problem.spacing;
+            let inside = (least..=most).contains(&(delay + SAME_PLACE * problem.spacing));
+            inside && problem.refined(at(delay), steps(problem), REFIT.1).cost <= tolerated
+        };
+        let reach = |sign: f64| (1..=MOST_ROWS).map(|by| sign * f64::from(by)).take_while(|rows| fits(*rows)).last();
+        let [low, high] = [-1.0, 1.0].map(|sign| reach(sign).unwrap_or(0.0) * problem.spacing);
+        (own.0 + low, own.1 + high)
+    } else {
+        let fits = |delay: f64| (least..=most).contains(&delay) && problem.fit(at(delay)).cost <= tolerated;
+        (reach(problem, own.0, -1.0, fits), reach(problem, own.1, 1.0, fits))
     };
-    let (above, _) = reach(&|(above, _)| above);
-    let (_, up_to) = reach(&|(_, up_to)| up_to + beyond);
-    Quantity { value: fit.poles.delay, low: above.clamp(least, most), high: up_to.clamp(least, most), unit: "s".into() }
+    Quantity { value: fit.poles.delay, low: low.clamp(least, most), high: high.clamp(least, most), unit: "s".into() }
 }
 
-/// The least and the largest of each quantity, in the order of [`Canonical::values`], with the delays of the fit's place, which all
-/// fit alike.
-pub(super) fn within_place_of_delay(problem: &Problem, fit: &Fit, canonical: &Canonical) -> Vec<(f64, f64)> {
+/// The farthest delay from `edge` on that fits, by steps that double until one does not and are halved then.
+fn reach(problem: &Problem, edge: f64, sign: f64, fits: impl Fn(f64) -> bool) -> f64 {
+    if !edge.is_finite() {
+        return edge;
+    }
+    let (mut far, mut step) = (edge, SHORTEST_REACH * problem.spacing);
+    let mut grows = true;
+    for _ in 0..MOST_REACHES {
+        if fits(far + sign * step) {
+            far += sign * step;
+        } else {
+            grows = false;
+        }
+        step *= if grows { 2.0 } else { 0.5 };
+        if step < SHORTEST_REACH * problem.spacing {
+            break;
+        }
+    }
+    far
+}
+
+/// The least and the largest of each quantity, in the order of [`Canonical::values`], over the delays that fit; where there is none, none
+/// of them is tried.
+pub(super) fn over_places(
+    problem: &Problem,
+    fit: &Fit,
+    canonical: &Canonical,
+    delay: Option<&Quantity>,
+) -> Vec<(f64, f64)> {
     let mut reach: Vec<(f64, f64)> =
         canonical.values(canonical).into_iter().flatten().map(|value| (value, value)).collect();
-    if !problem.bounds.held {
-        return reach;
-    }
-    let (above, up_to) = problem.place_of_delay(fit.poles.delay);
-    let (least, most) = problem.bounds.delay;
-    let ends = [above + SAME_PLACE * problem.spacing, up_to].map(|delay| delay.clamp(least, most));
-    for delay in ends {
+    let Some(Quantity { low, high, .. }) = delay.filter(|delay| delay.value > 0.0) else { return reach };
+    for delay in [low + SAME_PLACE * problem.spacing, *high] {
         let there = problem.fit(Poles { delay, ..fit.poles.clone() });
         for (of, value) in reach.iter_mut().zip(Canonical::of(problem, &there).values(canonical).into_iter().flatten())
         {

@@ -83,7 +83,8 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
         identified.linear = None;
         let shifts = &mut identified.report.zero_shifts;
         shifts.sort_by(|a, b| a.record.cmp(&b.record).then(a.from_s.total_cmp(&b.from_s)));
-        identified.report.remarks.insert(0, remarks::zero_shifts(&identified.report.zero_shifts, units));
+        let remark = remarks::zero_shifts(shifts, records.len() > 1, units);
+        identified.report.remarks.insert(0, remark);
     }
     if !stopped.is_empty() {
         identified.linear = None;

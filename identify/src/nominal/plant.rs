@@ -29,8 +29,8 @@ fn square(full_scale_v: f64) -> Law {
     Law { voltage_v, stiffness }
 }
 
-/// The instantaneous share: 0 or 1 where that is within the interval of one that is beyond, which no instantaneous response can have
-/// and a controller cannot use.
+/// The instantaneous share; one below 0 or above 1, which a controller cannot use, is replaced by that limit where its interval contains
+/// it.
 fn whole_share(nominal: &Nominal) -> f64 {
     let Quantity { value, low, high, .. } = nominal.share;
     let limits = [(value < 0.0 && high >= 0.0, 0.0), (value > 1.0 && low <= 1.0, 1.0)];

@@ -40,11 +40,12 @@ pub(super) fn held(readings: usize) -> String {
     )
 }
 
-/// The remark on shifts of the sensor's zero.
-pub(super) fn zero_shifts(shifts: &[ZeroShift], units: &Units) -> String {
-    let shown = |ZeroShift { from_s, by, .. }: &ZeroShift| {
+/// The remark on shifts of the sensor's zero, each with its record if there are `several`.
+pub(super) fn zero_shifts(shifts: &[ZeroShift], several: bool, units: &Units) -> String {
+    let shown = |ZeroShift { from_s, by, record }: &ZeroShift| {
         let time = significant(from_s / units.time.si, 6);
-        format!("by {} {} from {time} {} on", significant(*by, 4), units.reading, units.time.name)
+        let of = if several { format!(" in {record}") } else { String::new() };
+        format!("by {} {} from {time} {} on{of}", significant(*by, 4), units.reading, units.time.name)
     };
     let all: Vec<String> = shifts.iter().map(shown).collect();
     format!(
@@ -124,15 +125,15 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
             remarks.push(format!("The record hardly tells the time constant {}.", time(lag.tau.value)));
         }
     }
-    if problem.bounds.held && nominal.delay_s.value > 0.0 && report.order > 0 {
+    let delay = [nominal.delay_s.low, nominal.delay_s.high].map(time);
+    if problem.bounds.held && nominal.delay_s.value > 0.0 && report.order > 0 && delay[0] != delay[1] {
         let readings = match problem.bounds.whole_rows {
             true => format!("Readings every {}", time(problem.spacing)),
             false => "The times of the readings".into(),
         };
         remarks.push(format!(
             "{readings} cannot tell a part of this delay from a part of the instantaneous share: the delay is {} to {}.",
-            time(nominal.delay_s.low),
-            time(nominal.delay_s.high)
+            delay[0], delay[1]
         ));
     }
     if report.last_40_percent_rmse > STRUCTURED * report.held_out_rmse {

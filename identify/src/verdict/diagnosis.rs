@@ -264,9 +264,11 @@ const LACKING: &str = "Further linear dynamics explain part of the error, but th
 /// The report's sentence on unmodelled dynamics.
 fn sentence(found: &UnmodelledDynamics, extended: &Fit, scales: &Scales) -> String {
     let UnmodelledDynamics { place, share, rms, whitened, .. } = found;
-    let rms = scales.shown_in_four_digits(Dimension::ReadingSize, *rms);
-    let one_step = *whitened && !extended.noise.autocorrelation.is_white();
-    let of = if one_step { "the one-step error" } else { "the residual" };
+    let (of, rms) = match *whitened && !extended.noise.autocorrelation.is_white() {
+        true => ("the one-step error", share.max(0.0).sqrt() * extended.noise.sigma),
+        false => ("the residual", *rms),
+    };
+    let rms = scales.shown_in_four_digits(Dimension::ReadingSize, rms);
     format!("{:.1} % of {of} ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
 }
 
