@@ -6,7 +6,7 @@
 //! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
 //! | `with_missing_codes` | which, if a missing code is read as one of its neighbours? | if codes are missing | if that code is always the same one |
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
-//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run, not of an identified spring | if clearly likelier |
+//! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
 //!
 //! All passes work on a normalised record; the diagnosis is converted back to the file's units at the end. Every pass runs a
 //! `search`, which on a long record first searches a part of its rows. "Clearly likelier" means a score that is higher by
@@ -325,10 +325,7 @@ fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress
 /// score(best causes without the part) > score(best causes) + CLEARLY_LIKELIER
 /// ```
 fn without_unsupported_terms(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
-    // All parts of an identified spring are of the record itself.
-    let Some(mut warm_start) = found.warm_start.clone().filter(|_| !record.data.normalisation.identified) else {
-        return found;
-    };
+    let Some(mut warm_start) = found.warm_start.clone() else { return found };
     let (mut score, mut base) = (found.score, base.clone());
     let mut unsupported_terms = Vec::new();
     while !record.budget.is_over() {
@@ -375,11 +372,14 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     let report = &mut without.report;
     report.baseline = with.report.baseline;
     report.extended.gain = 1.0 - report.extended.quality.held_out_rmse / report.baseline.held_out_rmse.max(1e-12);
-    if report.verdict == Verdict::Consistent {
-        report.verdict = Verdict::Explained;
-        report.suspects.clear();
+    // Of an identified spring there is no file to take a part out of.
+    if !without.data.normalisation.identified {
+        if report.verdict == Verdict::Consistent {
+            report.verdict = Verdict::Explained;
+            report.suspects.clear();
+        }
+        report.take_out = unsupported_terms;
     }
-    report.take_out = unsupported_terms;
     // What stands in for a part of the plant file counts by what it removes beyond that part.
     for finding in &mut report.findings {
         finding.rmse_before = finding.rmse_before.min(report.baseline.rmse).max(finding.rmse_after);
