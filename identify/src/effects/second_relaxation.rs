@@ -29,7 +29,7 @@ const BY_DECADES: usize = 2;
 const SPREAD: usize = 3;
 const ADDED: usize = 4;
 const ADDED_BY_DECADES: usize = 5;
-/// Part of a creep within the record from which on it is told from a gain.
+/// Part of a creep within the record from which on it is distinguished from a gain.
 const LEAST_SEEN: f64 = 0.3;
 /// Largest creep that is added within the record's duration, relative to the nominal response.
 const MOST_ADDED: f64 = 3.0;

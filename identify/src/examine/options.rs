@@ -7,7 +7,7 @@ use simulation::units::Units;
 use crate::answer::Verdict;
 use crate::fit::budget::Effort;
 use crate::fit::stop::Stop;
-use crate::nominal::{BestLinear, Identified};
+use crate::nominal::{BestLinear, Identified, is_unpredictive};
 use crate::plant::base::Base;
 use crate::record::input::Input;
 
@@ -63,7 +63,7 @@ impl Options {
     pub fn judging(self, identified: Identified) -> Result<Self> {
         let Identified { report, plant, simpler, settled, decays, linear, .. } = identified;
         let (held_out_rmse, without_dynamics) = (Some(report.held_out_rmse), report.linear.is_empty());
-        let unpredictive = report.is_unpredictive();
+        let unpredictive = is_unpredictive(&report);
         let simpler = simpler.map(Base::new).transpose()?;
         let unsettled = !settled;
         Self {

@@ -3,15 +3,14 @@
 //! Each round computes the weights of the rows for the present residual (iteratively reweighted least squares) and
 //! takes the step only if the likelihood increases. Coordinates stay within their bounds.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 
 use crate::effects::effect::FitContext;
 use crate::effects::identified;
 use crate::effects::model::{Block, Model};
 use crate::fit::budget::{Budget, UNLIMITED};
-use crate::fit::held_out::KnownHeldOut;
 use crate::fit::known::Known;
+use crate::fit::known_held_out::KnownHeldOut;
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations, predicted_gain};
 use crate::fit::simulator::Simulator;
 use crate::noise::{Noise, Term};
@@ -139,7 +138,7 @@ pub struct Engine<'a> {
     /// Work that fits may do, and that was done.
     pub(super) budget: &'a Budget,
     /// The last held-out residuals.
-    pub(super) known_held_out: VecDeque<KnownHeldOut>,
+    pub(super) known_held_out: KnownHeldOut,
     /// Causes that a search may add; `None` for all.
     candidates: Option<&'a [&'static str]>,
 }
@@ -156,7 +155,7 @@ impl<'a> Engine<'a> {
         let (predicted, kernels) = (Vec::new(), Vec::new());
         let candidates = None;
         let baseline_residual = Vec::new();
-        let known_held_out = VecDeque::new();
+        let known_held_out = KnownHeldOut::default();
         let mut engine = Self {
             data,
             observed,

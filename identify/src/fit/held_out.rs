@@ -16,7 +16,7 @@
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
-use crate::noise::{Noise, Term};
+use crate::noise::Term;
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LEAST_INFORMATION;
 
@@ -55,14 +55,11 @@ impl Engine<'_> {
 
     fn held_out(&mut self, fit: &Fit, searches: bool) -> Vec<f64> {
         let searches = searches && fit.model.blocks.iter().any(|(block, _)| block.searched());
-        if let Some(known) = self.known_held_out.iter().find(|known| known.is_of(fit, searches)) {
-            return known.unseen.clone();
+        if let Some(known) = self.known_held_out.residual(&fit.model, &fit.noise, searches) {
+            return known;
         }
         let unseen = self.fitted_without_each_fold(fit, searches);
-        self.known_held_out.truncate(MOST_KNOWN - 1);
-        let known =
-            KnownHeldOut { model: fit.model.clone(), noise: fit.noise.clone(), searches, unseen: unseen.clone() };
-        self.known_held_out.push_front(known);
+        self.known_held_out.keep(&fit.model, &fit.noise, searches, &unseen);
         unseen
     }
 
@@ -101,24 +98,8 @@ impl Engine<'_> {
     }
 }
 
-/// Held-out residuals that are kept.
-const MOST_KNOWN: usize = 4;
 /// Newton steps of a fit to the first rows.
 const EXTRAPOLATION_STEPS: usize = 3;
-
-/// The held-out residual of a fit, which several passes ask for.
-pub(super) struct KnownHeldOut {
-    model: Model,
-    noise: Noise,
-    searches: bool,
-    unseen: Vec<f64>,
-}
-
-impl KnownHeldOut {
-    fn is_of(&self, fit: &Fit, searches: bool) -> bool {
-        self.searches == searches && self.model == fit.model && self.noise == fit.noise
-    }
-}
 
 /// A fit to all rows, prepared for fits without one fold.
 struct FullFit<'f> {

@@ -10,6 +10,7 @@ pub mod engine;
 pub mod held_out;
 pub mod interval;
 pub mod known;
+mod known_held_out;
 pub mod leave_one_out;
 pub mod normal_equations;
 mod reading_map;

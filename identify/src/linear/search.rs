@@ -221,7 +221,7 @@ fn next_places(problem: &Problem, delay: f64) -> Vec<f64> {
     before.take(PLACES_NEAR).chain(after.take(PLACES_NEAR)).filter(|delay| delay.is_finite()).collect()
 }
 
-/// The model with the best delay near its own, its sections unchanged: `part` of the rows told fewer places of the delay apart.
+/// The model with the best delay near its own, its sections unchanged: in `part` of the rows the places of the delay are wider.
 fn settled(problem: &Problem, part: &Problem, poles: Poles) -> Poles {
     if !problem.bounds.held || problem.bounds.whole_rows {
         return poles;

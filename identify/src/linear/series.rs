@@ -157,7 +157,7 @@ impl Series {
                 from => from.signum(),
             };
             let of = Piece { start: piece.start, from: piece.from.abs(), slope: sign * piece.slope };
-            // A step to the voltage of the other sign is none.
+            // A step to the same voltage of the other sign changes nothing.
             if rectified
                 .pieces
                 .last()

@@ -114,8 +114,8 @@ fn reach(problem: &Problem, edge: f64, sign: f64, fits: impl Fn(f64) -> bool) ->
     far
 }
 
-/// The least and the largest of each quantity, in the order of [`Canonical::values`], over the delays that fit; where there is none, none
-/// of them is tried.
+/// The least and the largest of each quantity, in the order of [`Canonical::values`], over the delays that fit if there is a
+/// delay.
 pub(super) fn over_places(
     problem: &Problem,
     fit: &Fit,

@@ -5,7 +5,7 @@ use simulation::record::Record;
 use crate::answer::LinearError;
 use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
 use crate::nominal::covariance::Spectrum;
-use crate::nominal::report::InputLaw;
+use crate::nominal::report::{InputLaw, Quantity, Report};
 use crate::nominal::usable::check;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::without_held;
@@ -122,6 +122,12 @@ impl Models {
     pub(super) fn best_fit(&self) -> &Fit {
         &self.fits[self.chosen].fit
     }
+}
+
+/// True if the static gain may be 0 and a fit to the first 60 % does not predict the rest: the model describes these readings only.
+pub fn is_unpredictive(report: &Report) -> bool {
+    let Quantity { low, high, .. } = report.nominal.gain;
+    (low..=high).contains(&0.0) && report.last_40_percent_rmse > STRUCTURED * report.held_out_rmse
 }
 
 /// True if errors are no noise of the sensor.

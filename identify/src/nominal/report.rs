@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::answer::LinearError;
-use crate::nominal::models::STRUCTURED;
 
 /// A quantity with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -166,12 +165,4 @@ pub struct Report {
     pub unit: String,
     /// Path of the plant file that was written; `None` if none was.
     pub model: Option<String>,
-}
-
-impl Report {
-    /// True if the static gain may be 0 and a fit to the first 60 % does not predict the rest: the model describes these readings only.
-    pub fn is_unpredictive(&self) -> bool {
-        let Quantity { low, high, .. } = self.nominal.gain;
-        (low..=high).contains(&0.0) && self.last_40_percent_rmse > STRUCTURED * self.held_out_rmse
-    }
 }

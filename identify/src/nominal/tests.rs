@@ -192,7 +192,7 @@ fn intervals_contain_delay_and_share_in_uneven_rows() {
             |report: &Report| report.remarks.iter().any(|of| of.contains("The times of the readings cannot tell"));
         assert!(reports.iter().all(remark));
     }
-    // A part of the rows tells fewer places apart.
+    // In the part of the rows that is searched the places are wider.
     let long = found(&[record(3, 4000, 0.2)]).report;
     assert!(holds(&&long) && long.nominal.delay_s.high - long.nominal.delay_s.low < 0.005, "{long:?}");
 }
@@ -220,7 +220,7 @@ fn interval_of_the_share_contains_that_of_a_delay_of_a_part_of_a_row() {
     assert!((report.order, delay_s.high <= 0.05 + 1e-9) == (1, true), "{report:?}");
 }
 
-/// A share that is not told from 0 is 0 for controllers, one that is stays.
+/// A negative share whose interval contains 0 is 0 for controllers; any other stays.
 #[test]
 fn plant_file_has_no_negative_share_that_is_not_shown() {
     let shares = [0.0, -0.2].map(|share| {
