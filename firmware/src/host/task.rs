@@ -26,42 +26,32 @@ pub async fn talk(line: &mut impl Line, server: &mut Server) -> ! {
             // None before the first tick: there is no state to report yet, and hosts repeat their requests.
             let Some(view) = with_mailbox(|mailbox| mailbox.view()) else { break };
             report_faults(line, server, &view).await;
-            match server.on_byte(*byte, &view) {
-                None => {}
-                Some(Step::Send(bytes)) => drop(send(line, bytes).await),
-                Some(Step::Command(command)) => {
-                    let after = hand_over(command, view.state).await;
-                    report_faults(line, server, &after).await;
-                    send(line, server.command_done(&after)).await;
-                }
-                Some(Step::Update(block, update)) => {
-                    let result = shared_store::update(block, update).await;
-                    // Erasing a page takes many ticks.
-                    let after = with_mailbox(|mailbox| mailbox.view()).unwrap_or(view);
-                    report_faults(line, server, &after).await;
-                    send(line, server.updated(block, result, &after)).await;
-                }
-                Some(Step::ReadSettings { built_in, number }) => {
-                    let part = shared_store::settings_part(built_in, number).await;
-                    send(line, server.settings_part(part)).await;
-                }
-                Some(Step::Capture(request)) => {
-                    // The reply is not kept while the frame is sent.
-                    let bytes = server.answered(&capture(request));
-                    send(line, bytes).await;
-                }
-                Some(Step::Isolation(request)) => {
-                    // Nor here.
-                    let bytes = server.answered(&isolation::execute(request, view.sample.tick).await);
-                    send(line, bytes).await;
-                }
-                Some(Step::Adaptation(request)) => {
-                    // Nor here.
-                    let bytes = server.answered(&adaptation::execute(request, view.sample.tick).await);
-                    send(line, bytes).await;
-                }
-                Some(Step::Restart(bytes)) => {
-                    send(line, bytes).await;
+            if let Some(step) = server.on_byte(*byte, &view) {
+                let restarts = matches!(step, Step::Restart(_));
+                // One place for all to be sent from; the replies are not kept meanwhile.
+                let bytes = match step {
+                    Step::Send(bytes) | Step::Restart(bytes) => bytes,
+                    Step::Command(command) => {
+                        let after = hand_over(command, view.state).await;
+                        report_faults(line, server, &after).await;
+                        server.command_done(&after)
+                    }
+                    Step::Update(block, update) => {
+                        let result = shared_store::update(block, update).await;
+                        // Erasing a page takes many ticks.
+                        let after = with_mailbox(|mailbox| mailbox.view()).unwrap_or(view);
+                        server.updated(block, result, &after)
+                    }
+                    Step::ReadSettings { built_in, number } => {
+                        let part = shared_store::settings_part(built_in, number).await;
+                        server.settings_part(part)
+                    }
+                    Step::Capture(request) => server.answered(&capture(request)),
+                    Step::Isolation(request) => server.answered(&isolation::execute(request, view.sample.tick).await),
+                    Step::Adaptation(request) => server.answered(&adaptation::execute(request, view.sample.tick).await),
+                };
+                send(line, bytes).await;
+                if restarts {
                     // Until the last bytes have been sent.
                     Timer::after(WRITE_TIMEOUT).await;
                     stop::restart()

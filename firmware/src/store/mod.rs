@@ -130,7 +130,11 @@ impl<P: Pages> Store<P> {
     /// of another program do not.
     pub fn is_damaged(&self, block: Block) -> bool {
         let newest = self.newest(block).map(|(id, _)| id.number);
-        let broken = [Side::A, Side::B].map(|side| self.broken(Page { block, side }));
+        let broken = |side| {
+            let page = self.pages.bytes(Page { block, side });
+            if open(block, page).is_some() { None } else { sealed_number(block, page) }
+        };
+        let broken = self.pages.tolerate_bit_errors(|| [Side::A, Side::B].map(broken));
         // A page with a smaller number is one whose erasure a power cut has interrupted.
         broken.into_iter().flatten().any(|number| newest.is_none_or(|newest| number == newest.wrapping_add(1)))
     }
@@ -158,8 +162,8 @@ impl<P: Pages> Store<P> {
         Ok(())
     }
 
-    /// Seals a block's new content if its payload is complete and `check` accepts it. Damaged content in the other page is erased: it
-    /// could be newer by its number, and valid again if its weak bits read right.
+    /// Seals a block's new content if its payload is complete and `check` accepts it. If none was valid before, the other page is erased:
+    /// what is damaged there could be newer by its number, and valid again if its weak bits read right.
     ///
     /// # Errors
     /// The [`Reason`] for rejecting the content; the old one remains valid.
@@ -175,7 +179,8 @@ impl<P: Pages> Store<P> {
             return Err(Reason::PartMissing(expected));
         }
         let page = self.unused(block);
-        let number = self.newest(block).map_or(0, |(id, _)| id.number).wrapping_add(1);
+        let old = self.newest(block).map(|(id, _)| id.number);
+        let number = old.unwrap_or(0).wrapping_add(1);
         let payload = self.pages.bytes(page).get(HEADER..HEADER + usize::from(length)).ok_or(Reason::Damaged)?;
         let id = BlockId::of(number, payload);
         if id.checksum != checksum {
@@ -187,24 +192,14 @@ impl<P: Pages> Store<P> {
         self.pages.program(page, WORD, last).map_err(not_stored)?;
         match self.newest(block) {
             Some((stored, _)) if stored == id => {
-                let other = self.unused(block);
-                if self.broken(other).is_some() {
+                if old.is_none() {
                     // The new content is valid whether or not this succeeds.
-                    let _ = self.pages.erase(other);
+                    let _ = self.pages.erase(Page { block, side: page.side.other() });
                 }
                 Ok(id)
             }
             _ => Err(Reason::NotStored),
         }
-    }
-
-    /// The number of a page that was sealed and is damaged; `None` of any other.
-    fn broken(&self, page: Page) -> Option<u32> {
-        let bytes = self.pages.bytes(page);
-        self.pages.tolerate_bit_errors(|| match open(page.block, bytes) {
-            Some(_) => None,
-            None => sealed_number(page.block, bytes),
-        })
     }
 
     /// Number of the next part of `block`, 0 if the transfer is one of another block. The transfer ends.
