@@ -1,7 +1,7 @@
 //! The plant file of an identified spring is the spring that was identified: a diagnosis against it starts from the same error.
 
 use identify::nominal::report::InputLaw;
-use identify::{Input, Options, Verdict, examine, identify};
+use identify::{Input, Options, Verdict, examine, examine_several, identify};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -132,6 +132,23 @@ fn no_cause_is_found_in_fewer_readings_than_a_time_constant_takes() {
         let report = examine(&record, &options, |_| ()).unwrap().report;
         assert_eq!((report.verdict, report.findings.len()), (Verdict::Insufficient, 0), "{report:#?}");
     }
+}
+
+/// Nor in two such records, also where each alone would have a cause.
+#[test]
+fn no_cause_is_found_in_several_records_of_few_readings() {
+    let lag: Rates = |u, [x, _]| [(u - x) / 0.8, 0.0];
+    let whole = record(lag, |_, [x, _]| x, [1.0, 2.0]);
+    let part = |from: usize| {
+        let rows = whole.rows[from..].iter().step_by(8).take(8).cloned().collect();
+        Record { name: format!("from row {from}"), rows }
+    };
+    let records = [part(23), part(207)];
+    let identified = identify(&records, Input::Hold, &Units::default()).unwrap();
+    let options = Options::default().judging(identified).unwrap();
+    let report = examine_several(&records, &options, |_| ()).unwrap().report;
+    let single = report.records.iter().map(|of| of.findings.len()).sum::<usize>();
+    assert_eq!((report.verdict, report.findings.len(), single), (Verdict::Insufficient, 0, 0), "{report:#?}");
 }
 
 /// A dead zone beyond which the gain is the nominal one lowers the static gain; so does creep that is far slower than the record, which
