@@ -33,8 +33,8 @@ pub struct Options {
     pub simpler: Option<Base>,
     /// Root mean square error of the identified spring on held-out segments, in the reading's unit; `None` if it was not identified.
     pub held_out_rmse: Option<f64>,
-    /// True if so few readings were identified that no model with a time constant was tried: that the simulation agrees with them says
-    /// nothing.
+    /// True if so few readings were identified that no model with a time constant was tried: no cause is searched for, and that the
+    /// simulation agrees with them says nothing.
     pub without_dynamics: bool,
     /// True if the identified spring may have no static gain, and a fit to the first 60 % of the readings does not predict the others:
     /// that the simulation agrees with all of them says nothing.

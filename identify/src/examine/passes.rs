@@ -72,15 +72,20 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let judge = linear.as_ref().filter(|_| !reports_changes(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
-    if options.says_nothing(found.report.verdict) {
-        found.report.verdict = Verdict::Insufficient;
-        found.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
-    }
+    withhold(&mut found.report, options);
     hypothesise(&mut found, &records[0], options, judge);
     if let Some(held) = &held {
         add_held(&mut found.report, held, &options.units);
     }
     Ok(found)
+}
+
+/// Makes a verdict `insufficient` that says nothing of the record.
+pub(super) fn withhold(report: &mut Report, options: &Options) {
+    if options.says_nothing(report.verdict) {
+        report.verdict = Verdict::Insufficient;
+        report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
+    }
 }
 
 /// Returns the record without the held readings that say nothing of the response.

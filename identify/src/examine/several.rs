@@ -19,7 +19,7 @@ use simulation::record::Record;
 use crate::answer::{RecordReport, Report, Verdict};
 use crate::effects::EFFECTS;
 use crate::examine::options::Options;
-use crate::examine::passes::{self, examine, informative, joint, reports_changes};
+use crate::examine::passes::{self, examine, informative, joint, reports_changes, withhold};
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
@@ -114,10 +114,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
     }
     (joint.report.verdict, joint.report.rows) = (verdict, rows);
-    if options.says_nothing(verdict) {
-        joint.report.verdict = Verdict::Insufficient;
-        joint.report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
-    }
+    withhold(&mut joint.report, &options);
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }

@@ -58,9 +58,12 @@ impl Series {
     pub fn new(record: &Record, input: Input) -> Self {
         let first = record.rows.first().map_or(0.0, |row| row.time_s);
         let mut times: Vec<f64> = record.rows.iter().map(|row| row.time_s - first).collect();
-        let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let spacing = median(&mut gaps).unwrap_or(1.0);
+        let typical = |times: &[f64]| {
+            let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            median(&mut gaps).unwrap_or(1.0)
+        };
         let clock = Clock::of(&times);
+        let spacing = clock.as_ref().map_or_else(|| typical(&times), |clock| clock.interval);
         if let Some(clock) = &clock {
             times.iter_mut().zip(&clock.ticks).for_each(|(time, tick)| *time = tick * clock.interval);
         }
@@ -80,7 +83,7 @@ impl Series {
             time,
             reading,
             fold: folds(&commanded),
-            spacing: clock.as_ref().map_or(spacing, |clock| clock.interval),
+            spacing,
             held: input == Input::Hold,
             even: clock.is_some(),
             shifts: Vec::new(),

@@ -13,7 +13,6 @@ const ROUNDING: f64 = 1e-3;
 const MOST_UNITS: f64 = 1.5;
 /// Largest deviation of a gap between rows from the two that rounding leaves of equal ones, in units of the last digit.
 const SAME_GAP: f64 = 0.01;
-
 /// Largest unit of the last digit that is attributed to rounding, in intervals.
 const COARSEST: f64 = 1.0 / 3.0;
 /// Largest deviation of a gap from a whole number of these units.
@@ -40,7 +39,7 @@ impl Clock {
     pub fn of(times: &[f64]) -> Option<Self> {
         let gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         // The median would be no single interval where many rows were lost.
-        let typical = *sorted(&gaps).get(gaps.len() / 4).filter(|gap| **gap > 0.0)?;
+        let typical = lower_quartile(&gaps).filter(|gap| *gap > 0.0)?;
         let single: Vec<f64> = gaps.iter().copied().filter(|gap| (gap / typical).round() == 1.0).collect();
         let mean = single.iter().sum::<f64>() / single.len() as f64;
         let counts = || gaps.iter().map(|gap| (gap / mean).round());
@@ -81,11 +80,11 @@ impl Clock {
     }
 }
 
-/// Returns numbers in ascending order.
-fn sorted(of: &[f64]) -> Vec<f64> {
-    let mut sorted = of.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted
+/// Returns the number that a quarter of the others do not exceed; `None` of none.
+fn lower_quartile(of: &[f64]) -> Option<f64> {
+    let mut ordered = of.to_vec();
+    let at = (!of.is_empty()).then_some(of.len() / 4)?;
+    Some(*ordered.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// Sums of the products of ticks and times and of the squares of the ticks, each less its mean.
