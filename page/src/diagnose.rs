@@ -173,7 +173,7 @@ pub fn diagnose(records: &Records, files: &[u8], stop: &Stop, progress: &mut dyn
         "paper" => options.judging_file("paper", plant_file::load_for_host("paper")?)?,
         text => options.judging_file("plant.toml", plant_file::parse_for_host("plant.toml", text)?)?,
     };
-    read.remarks.extend(options.remark());
+    read.remarks.extend(options.remarks());
     let found = examine_several(&read.records, &options, |causes| {
         progress(&serde_json::json!({ "causes": causes }).to_string());
     })?;

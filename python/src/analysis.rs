@@ -122,7 +122,7 @@ pub(crate) fn diagnose<'py>(
             Plant::Named(name) => options.judging_file(&name, plant_file::load_for_host(&name)?)?,
             Plant::Text((name, text)) => options.judging_file(&name, plant_file::parse_for_host(&name, &text)?)?,
         };
-        records.remarks.extend(options.remark());
+        records.remarks.extend(options.remarks());
         let found = examine_several(&rows, &options, |_| {})?;
         let json = serde_json::to_string(&found.report)?;
         let plant = plant_text(&found.plant, &records)?;

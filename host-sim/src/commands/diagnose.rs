@@ -139,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let records: Vec<Record> = measured.iter().map(|measured| measured.record.clone()).collect();
     records.iter().try_for_each(|record| input.check(record))?;
     let options = arguments.options(&measured, &records, input, stop)?;
-    options.remark().iter().for_each(|text| remark(text));
+    options.remarks().iter().for_each(|text| remark(text));
     // A folder that cannot be created is reported before the search starts.
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
     let mut diagnosis = with_progress(&records, &options, arguments.progress)?;

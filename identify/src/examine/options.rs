@@ -27,6 +27,8 @@ pub struct Options {
     /// True if the simulation was identified from the record that is diagnosed: gain, zero and relaxation are then estimated anew with
     /// every set of causes, as causes that a linear model lacks bias them.
     pub identified: bool,
+    /// True for one of several records, whose zero is estimated anew with every set of causes: a fault of it has biased the one of all.
+    pub zero_unknown: bool,
     /// True if these readings also show a decay that the voltage does not drive, see [`Identified::decays`].
     pub decays: bool,
     /// An identified spring of lower order that is diagnosed as well: a model of higher order imitates what is not linear.
@@ -39,6 +41,8 @@ pub struct Options {
     /// True if the identified spring may have no static gain, and a fit to the first 60 % of the readings does not predict the others:
     /// that the simulation agrees with all of them says nothing.
     pub unpredictive: bool,
+    /// What the identified spring leaves in doubt, in sentences.
+    pub doubts: Vec<String>,
     /// How long causes are searched for.
     pub effort: Effort,
     /// The best linear model of the records, if it is known; it is fitted otherwise.
@@ -61,7 +65,7 @@ impl Options {
     /// # Errors
     /// Those of [`Base::new`].
     pub fn judging(self, identified: Identified) -> Result<Self> {
-        let Identified { report, plant, simpler, settled, decays, linear, .. } = identified;
+        let Identified { report, plant, simpler, settled, decays, doubts, linear, .. } = identified;
         let (held_out_rmse, without_dynamics) = (Some(report.held_out_rmse), report.linear.is_empty());
         let unpredictive = is_unpredictive(&report);
         let simpler = simpler.map(Base::new).transpose()?;
@@ -74,6 +78,7 @@ impl Options {
             held_out_rmse,
             without_dynamics,
             unpredictive,
+            doubts,
             linear,
             ..self
         }
@@ -95,16 +100,18 @@ impl Options {
         Self { identified: false, simpler: None, ..self.clone() }
     }
 
-    /// Returns what the user should know who compares readings of another quantity with the paper's spring: its gain and zero are no
-    /// causes then.
-    pub fn remark(&self) -> Option<String> {
+    /// Returns what the user should know of the nominal spring: that readings of another quantity are compared with the paper's, whose
+    /// gain and zero are no causes then, or what an identified one leaves in doubt.
+    pub fn remarks(&self) -> Vec<String> {
         let reading = &self.units.reading;
-        (self.plant == "paper" && *reading != Units::default().reading).then(|| {
+        let is_other = self.plant == "paper" && *reading != Units::default().reading;
+        let of_paper = is_other.then(|| {
             format!(
                 "the readings are in {reading}, those of the report's spring in V; `--plant identify` compares with the gain, zero and \
                  time constants that the record shows"
             )
-        })
+        });
+        of_paper.into_iter().chain(self.doubts.iter().map(|doubt| format!("nominal spring: {doubt}"))).collect()
     }
 }
 
@@ -118,11 +125,13 @@ impl Default for Options {
             base: Base::paper(),
             unsettled: false,
             identified: false,
+            zero_unknown: false,
             decays: false,
             simpler: None,
             held_out_rmse: None,
             without_dynamics: false,
             unpredictive: false,
+            doubts: Vec::new(),
             effort: Effort::Normal,
             linear: None,
             stop: Stop::default(),

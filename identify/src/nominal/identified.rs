@@ -31,6 +31,8 @@ pub struct Identified {
     /// True if the readings also show a decay that the voltage does not drive: a drift, or what an earlier voltage left behind in a slow
     /// part of the spring.
     pub decays: bool,
+    /// What the spring leaves in doubt, in sentences that are remarks of the report as well.
+    pub doubts: Vec<String>,
     /// The best linear model of the records, which may be of another order or law of the input; `None` if readings were left out.
     pub linear: Option<BestLinear>,
     /// The readings of each record and the model of them.
@@ -137,6 +139,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         model: None,
     };
     report.remarks = remarks::remarks(&report, problem, fit, units);
+    let doubts = remarks::doubts(&report, problem, fit, units);
     let course = |(record, (&first, series)): (&Record, (&usize, &Series))| {
         let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));
         let part = first..first + series.rows();
@@ -152,5 +155,5 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
     let records = records.iter().zip(problem.starts().iter().zip(&problem.series)).map(course).collect();
     let settled = problem.series.iter().all(Series::is_at_rest);
     let decays = fit.poles.undriven.iter().any(|place| matches!(fit.poles.sections[*place], Section::First { .. }));
-    Identified { report, plant, simpler: None, settled, decays, linear: None, records }
+    Identified { report, plant, simpler: None, settled, decays, doubts, linear: None, records }
 }

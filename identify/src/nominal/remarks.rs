@@ -68,19 +68,11 @@ pub(super) fn at_bounds(stopped: &[AtBound], units: &Units) -> String {
     )
 }
 
-/// The remarks on an identification.
-pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
+/// What an identified spring leaves in doubt: whether its gain, its time constants and what the readings show are properties of the
+/// spring at all.
+pub(super) fn doubts(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
     let nominal = &report.nominal;
     let mut remarks = Vec::new();
-    if report.input_law == InputLaw::Square {
-        let full_scale = problem.series.iter().map(|series| series.full_scale()).fold(0.0, f64::max);
-        remarks.push(format!(
-            "The gain is that at {} {}: the reading follows the square of the voltage.",
-            significant(full_scale / units.voltage.si, 4),
-            units.voltage.name
-        ));
-    }
-    let time = |seconds: f64| format!("{} {}", significant(seconds / units.time.si, 4), units.time.name);
     if nominal.gain.low <= 0.0 && nominal.gain.high >= 0.0 {
         remarks.push(if report.held_out_rmse < RESPONDS * report.static_held_out_rmse {
             "The records show a response but not where it settles: the interval of the gain contains 0. The spring settles in \
@@ -91,7 +83,7 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         });
     }
     let undriven = fit.poles.undriven.iter().map(|&place| match fit.poles.sections[place] {
-        Section::First { tau } => format!("a change over {} that fades", time(tau)),
+        Section::First { tau } => format!("a change over {} that fades", shown(tau, units)),
         Section::Second { frequency, .. } => format!("an oscillation of {} Hz", significant(frequency / TAU, 4)),
     });
     let undriven: Vec<String> = undriven.collect();
@@ -106,6 +98,40 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
         remarks
             .push(format!("A parameter is on its bound, {bound} that is searched; its interval is not to be trusted."));
     }
+    let duration = duration(problem);
+    for lag in nominal.tau_s.iter().filter(|lag| lag.tau.value > duration) {
+        remarks.push(format!(
+            "The time constant {} is longer than the record ({}), so that it may be a drift.",
+            shown(lag.tau.value, units),
+            shown(duration, units)
+        ));
+    }
+    remarks
+}
+
+/// Returns the duration of the longest record, in s.
+fn duration(problem: &Problem) -> f64 {
+    problem.series.iter().map(|series| series.duration()).fold(0.0, f64::max)
+}
+
+/// Returns a time in the user's unit.
+fn shown(seconds: f64, units: &Units) -> String {
+    format!("{} {}", significant(seconds / units.time.si, 4), units.time.name)
+}
+
+/// The remarks on an identification.
+pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
+    let nominal = &report.nominal;
+    let mut remarks = Vec::new();
+    if report.input_law == InputLaw::Square {
+        let full_scale = problem.series.iter().map(|series| series.full_scale()).fold(0.0, f64::max);
+        remarks.push(format!(
+            "The gain is that at {} {}: the reading follows the square of the voltage.",
+            significant(full_scale / units.voltage.si, 4),
+            units.voltage.name
+        ));
+    }
+    remarks.extend(doubts(report, problem, fit, units));
     if (nominal.share.high < 0.0 || nominal.share.low > 1.0) && report.order > 0 {
         remarks.push(format!(
             "The instantaneous share {} is outside of 0 to 1: the first response goes {}.",
@@ -113,22 +139,16 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
             if nominal.share.value < 0.0 { "the other way" } else { "beyond the settled one" }
         ));
     }
-    let duration = problem.series.iter().map(|series| series.duration()).fold(0.0, f64::max);
+    let duration = duration(problem);
     for lag in &nominal.tau_s {
-        if lag.tau.value > duration {
-            remarks.push(format!(
-                "The time constant {} is longer than the record ({}), so that it may be a drift.",
-                time(lag.tau.value),
-                time(duration)
-            ));
-        } else if lag.tau.high > HARDLY_KNOWN * lag.tau.low {
-            remarks.push(format!("The record hardly tells the time constant {}.", time(lag.tau.value)));
+        if lag.tau.value <= duration && lag.tau.high > HARDLY_KNOWN * lag.tau.low {
+            remarks.push(format!("The record hardly tells the time constant {}.", shown(lag.tau.value, units)));
         }
     }
-    let delay = [nominal.delay_s.low, nominal.delay_s.high].map(time);
+    let delay = [nominal.delay_s.low, nominal.delay_s.high].map(|seconds| shown(seconds, units));
     if problem.bounds.held && nominal.delay_s.value > 0.0 && report.order > 0 && delay[0] != delay[1] {
         let readings = match problem.bounds.whole_rows {
-            true => format!("Readings every {}", time(problem.spacing)),
+            true => format!("Readings every {}", shown(problem.spacing, units)),
             false => "The times of the readings".into(),
         };
         remarks.push(format!(
