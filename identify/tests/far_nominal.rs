@@ -141,3 +141,22 @@ fn a_resonator_under_a_multisine_is_diagnosed() {
     assert!((value(&report, "freq_hz") / 68.0 - 1.0).abs() < 0.02, "{report:?}");
     assert!(report.extended.quality.rmse < 0.2 * report.baseline.rmse, "{report:?}");
 }
+
+/// A quadratic law that is right at the largest voltage is no error of the gain, in whatever unit the command is.
+#[test]
+fn the_unit_of_the_command_changes_no_answer() {
+    let law = |voltage: f64| voltage * (1.0 - 0.5 * (voltage / 500.0 - 1.0));
+    let record = Spring { law, ..PAPER }.record(STAIR);
+    let reports = [0.002, 1.0, 1.2, 9.9].map(|unit| {
+        let row = |row: &Row| Row { voltage_v: unit * row.voltage_v, ..*row };
+        let record = Record { rows: record.rows.iter().map(row).collect(), ..record.clone() };
+        let reading = Some(Reading { gain: 1.0 / unit, zero: 0.0 });
+        let base = Base::new(PlantFile { reading, ..Base::paper().file().clone() }).unwrap();
+        diagnose(&record, &Options { base, ..Options::default() }).unwrap()
+    });
+    for report in &reports {
+        assert_eq!(causes(report), ["static-nonlinearity"], "{report:?}");
+        let (probability, of_first) = (report.findings[0].probability, reports[0].findings[0].probability);
+        assert!((probability - of_first).abs() < 1e-3, "{probability} {of_first}");
+    }
+}

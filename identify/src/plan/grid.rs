@@ -82,5 +82,5 @@ pub(super) fn normalisation(coordinates: &Coordinates) -> Normalisation {
     let Coordinates { second_s, volt_v, zero, reading, output, share, even, start, .. } = *coordinates;
     let scales = Scales { start_s: 0.0, second_s, volt_v, zero, reading, output, ..Scales::default() };
     let start = start.map(|it| Start { gain: it.gain, tau_s: it.tau_s, share: it.share, offset: it.offset });
-    Normalisation { scales, share, even, start, unsettled: false, identified: false, decays: false }
+    Normalisation { scales, share, even, start, ..Normalisation::default() }
 }

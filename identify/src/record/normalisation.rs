@@ -3,8 +3,10 @@
 //! | scale | from the nominal spring | from the record, where that is off by more |
 //! | --- | --- | --- |
 //! | time | its first time constant | than a factor of `FAR_TIME_CONSTANT` |
-//! | voltage | the voltage of its `tau_high_at_v` | than a factor of `FAR_SIZE` |
+//! | voltage | the voltage of its `tau_high_at_v`; 500 V for readings in V of the paper's spring | than a factor of `FAR_SIZE` |
 //! | reading | its gain | than a factor of `FAR_SIZE`, or in sign |
+//!
+//! For other readings, without `tau_high_at_v`, the largest voltage of the record is used: no voltage has a meaning of its own.
 //!
 //! The record's own time constant, gain and zero are those of a quick first-order fit. They are also where the search starts if
 //! the nominal spring is far from the record ([`Start`]).
@@ -62,6 +64,8 @@ pub struct Normalisation {
     /// True if the nominal spring was identified from the same readings: its gain and zero are estimated anew for every model, as
     /// causes that it lacks have biased them.
     pub identified: bool,
+    /// True for one of several records: its zero is estimated anew for every model, as a fault of it has biased the one of all.
+    pub zero_unknown: bool,
     /// True if the readings also show a decay that the voltage does not drive: a drift, or what an earlier voltage left behind.
     pub decays: bool,
 }
@@ -76,6 +80,7 @@ impl Default for Normalisation {
             start: None,
             unsettled: false,
             identified: false,
+            zero_unknown: false,
             decays: false,
         }
     }
@@ -86,7 +91,8 @@ impl Normalisation {
     pub fn of(record: &Record, nominal: &PlantFile, input: Input, units: Units) -> Self {
         let reading = nominal.reading.unwrap_or_default();
         let (tau_s, share, even) = (first_time_constant(nominal), nominal.relaxation.share, nominal.even);
-        let reference_v = nominal.relaxation.tau_high_at_v.unwrap_or(Relaxation::HIGH_V);
+        let paper_v = nominal.reading.is_none().then_some(Relaxation::HIGH_V);
+        let reference_v = nominal.relaxation.tau_high_at_v.or(paper_v);
         let mut scales = Scales { zero: reading.zero, units, ..Scales::default() };
         if input == Input::Stair {
             // The stair has its own times and voltages, in s and V.
@@ -95,8 +101,8 @@ impl Normalisation {
         }
         let full_scale_v = record.rows.iter().map(|row| row.voltage_v.abs()).fold(0.0, f64::max);
         let far = |ratio: f64, times: f64| !(1.0 / times..=times).contains(&ratio);
-        let volts =
-            if full_scale_v > 0.0 && far(full_scale_v / reference_v, FAR_SIZE) { full_scale_v } else { reference_v };
+        let given = reference_v.filter(|volts| full_scale_v <= 0.0 || !far(full_scale_v / volts, FAR_SIZE));
+        let volts = given.unwrap_or(if full_scale_v > 0.0 { full_scale_v } else { Relaxation::HIGH_V });
 
         let rows = Rows::new(record, input == Input::Linear, even);
         let best = rows.best().filter(|best| best.unexplained < BELIEVED);
@@ -124,15 +130,7 @@ impl Normalisation {
             share: best.share.clamp(0.0, 1.0),
             offset: (best.zero - reading.zero) / scales.reading,
         });
-        Self {
-            share: start.map_or(share, |start| start.share),
-            scales,
-            even,
-            start,
-            unsettled: false,
-            identified: false,
-            decays: false,
-        }
+        Self { share: start.map_or(share, |start| start.share), scales, even, start, ..Self::default() }
     }
 
     /// Chooses the coordinates for several records of one spring: those of the first, but that time begins with each.
