@@ -1,7 +1,8 @@
 //! The grid on which readings lie: steps of the converter, or of the last printed digit.
 //!
 //! Readings of a converter and their differences are multiples of its step, but printing rounds them once more, to a
-//! unit `p` of the last digit. A difference `d` of `k` steps then bounds the step:
+//! unit of the last digit: that of a number of decimals, or of a number of significant digits, which is smaller for smaller
+//! readings. A difference `d` of `k` steps between readings with a mean unit `p` then bounds the step:
 //!
 //! ```text
 //! d - p <= k step <= d + p
@@ -23,14 +24,16 @@ pub struct QuantisationGrid {
 
 /// Relative uncertainty of a step that is not limited by printed digits.
 const RELATIVE_ERROR: f64 = 1e-6;
-/// Largest number of decimals that is taken for deliberate rounding.
-const MOST_DECIMALS: i32 = 9;
+/// Largest number of decimals, or of significant digits, that is taken for deliberate rounding.
+const MOST_DIGITS: i32 = 9;
 
 impl QuantisationGrid {
     /// Returns the coarsest grid that contains all values, which must be distinct and in ascending order; `None` if
     /// there is none.
     pub fn of(values: &[f64]) -> Option<Self> {
-        printed(values).or_else(|| {
+        let printed =
+            || [decimals(values), significant(values)].into_iter().flatten().find_map(|p| printed(values, &p));
+        printed().or_else(|| {
             common(values).map(|step| Self {
                 step,
                 low: step * (1.0 - RELATIVE_ERROR),
@@ -60,20 +63,22 @@ fn common(values: &[f64]) -> Option<f64> {
     (step < span).then_some(step)
 }
 
-/// Returns the bounds of a step whose multiples were rounded to the last printed digit.
-fn printed(values: &[f64]) -> Option<QuantisationGrid> {
-    let unit = unit(values)?;
-    let first = values.first()?;
-    let mut differences: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    differences.sort_by(f64::total_cmp);
-    let least = *differences.first()?;
-    let chance = (2.0 * unit / least).ln() * (differences.len() as f64 - 1.0);
-    if least < FEWEST_UNITS.get() * unit || chance > -CHANCE_NATS {
+/// Returns the bounds of a step whose multiples were rounded to the last printed digit, of which each value has its unit.
+fn printed(values: &[f64], units: &[f64]) -> Option<QuantisationGrid> {
+    let between = |from: usize, to: usize| (values[to] - values[from], 0.5 * (units[from] + units[to]));
+    let mut differences: Vec<(f64, f64)> = (1..values.len()).map(|to| between(to - 1, to)).collect();
+    differences.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (least, unit) = *differences.first()?;
+    // One of the differences is the step by definition.
+    let chances = differences.iter().map(|(_, unit)| (2.0 * unit / least).ln()).sum::<f64>();
+    let chance = chances * (1.0 - 1.0 / differences.len() as f64);
+    let coarsest = differences.iter().map(|(_, unit)| *unit).fold(0.0, f64::max);
+    if least < FEWEST_UNITS.get() * coarsest || chance > -CHANCE_NATS {
         return None;
     }
     let (mut low, mut high) = (least - unit, least + unit);
     // Differences of neighbours first; larger differences then narrow the bounds.
-    for difference in differences.into_iter().chain(values[1..].iter().map(|value| value - first)) {
+    for (difference, unit) in differences.into_iter().chain((1..values.len()).map(|to| between(0, to))) {
         let fewest = ((difference - unit) / high).ceil();
         let most = ((difference + unit) / low).floor();
         if fewest > most {
@@ -86,12 +91,27 @@ fn printed(values: &[f64]) -> Option<QuantisationGrid> {
     (low <= high).then(|| QuantisationGrid { step: (low + high) / 2.0, low, high })
 }
 
-/// Returns the unit of the last printed digit, if there are at most [`MOST_DECIMALS`] decimals.
-fn unit(values: &[f64]) -> Option<f64> {
-    let is_whole = |value: f64| (value - value.round()).abs() < RELATIVE_ERROR * value.abs().max(1.0).sqrt();
-    (0..MOST_DECIMALS)
-        .find(|&digits| values.iter().all(|value| is_whole(value * 10f64.powi(digits))))
-        .map(|digits| 10f64.powi(-digits))
+/// Returns true if a number of units is whole.
+fn is_whole(units: f64) -> bool {
+    (units - units.round()).abs() < RELATIVE_ERROR * units.abs().max(1.0).sqrt()
+}
+
+/// Returns the unit of the last printed digit, for each value, if there are at most [`MOST_DIGITS`] decimals.
+fn decimals(values: &[f64]) -> Option<Vec<f64>> {
+    let unit = |digits: i32| 10f64.powi(digits);
+    let digits = (0..MOST_DIGITS).find(|&digits| values.iter().all(|value| is_whole(value * unit(digits))))?;
+    Some(vec![1.0 / unit(digits); values.len()])
+}
+
+/// Returns the same if each value has at most [`MOST_DIGITS`] significant digits.
+fn significant(values: &[f64]) -> Option<Vec<f64>> {
+    let unit = |value: f64, digits: i32| match value.abs().log10().floor() {
+        exponent if exponent.is_finite() => 10f64.powi(exponent as i32 + 1 - digits),
+        _ => 0.0,
+    };
+    let is_whole = |value: f64, digits: i32| value == 0.0 || is_whole(value / unit(value, digits));
+    let digits = (1..=MOST_DIGITS).find(|&digits| values.iter().all(|&value| is_whole(value, digits)))?;
+    Some(values.iter().map(|&value| unit(value, digits)).collect())
 }
 
 #[cfg(test)]
@@ -118,6 +138,11 @@ mod tests {
             assert!((step - 14.554_425_3).abs() < 0.1 * 0.1f64.powi(digits), "{digits}: {step}");
             assert!(low <= 14.554_425_3 && 14.554_425_3 <= high, "{digits}: {low} to {high}");
         }
+        // Printed with a number of significant digits, smaller values have more decimals.
+        let value = |k: i32| format!("{:.5e}", f64::from(k) * 0.145_544_253).parse().unwrap();
+        let digits: Vec<f64> = (-9..90).filter(|k| k % 7 != 3).map(value).collect();
+        let QuantisationGrid { step, low, high } = QuantisationGrid::of(&digits).unwrap();
+        assert!((step - 0.145_544_253).abs() < 1e-5 && low <= 0.145_544_253 && 0.145_544_253 <= high, "{step}");
         // Without a coarser step, the step is one unit of the last digit.
         let dense: Vec<f64> = (0..300).map(|k| f64::from(k) / 10.0).collect();
         assert!((QuantisationGrid::of(&dense).unwrap().step - 0.1).abs() < 1e-9);
