@@ -101,9 +101,10 @@ fn count_of_steps(far: &[bool], errors: &[f64], sigma: f64) -> Option<usize> {
     (steps > spikes && steps >= FEWEST_STEPS).then_some(steps)
 }
 
-/// For each row, true if the reading is far off by its innovation.
+/// For each row, true if the reading is far off by its innovation, beyond what rounding makes of it.
 pub(crate) fn far_off(noise: &Noise, innovations: &[f64]) -> Vec<bool> {
-    innovations.iter().map(|innovation| innovation.abs() > FAR_OFF_SCALES.get() * noise.sigma).collect()
+    let near_v = noise.half_step + FAR_OFF_SCALES.get() * noise.sigma;
+    innovations.iter().map(|innovation| innovation.abs() > near_v).collect()
 }
 
 /// For each row, true if it is just after a change of the voltage, which leaves the amplifier `delay_s` seconds late.

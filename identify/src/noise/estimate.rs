@@ -16,12 +16,12 @@ impl Noise {
             && (observed.step_beyond(COARSE.get()).is_some()
                 || step >= COARSE.get() * without_rounding(root_mean_square(residual), step).max(FINEST_V.get()))
         {
+            let robust = noise.sigma;
             noise.half_step = step / 2.0;
             noise.nu = f64::INFINITY;
             noise.sigma = without_rounding(root_mean_square(residual), step).max(0.05 * step).max(FINEST_V.get());
             noise.rescale_cells(residual, observed);
-            noise.marginal = noise.sigma;
-            return noise;
+            return noise.or_with_outliers(residual, observed, robust);
         }
         if negligible(residual) {
             return noise.with_tail(f64::INFINITY, FINEST_V.get());
@@ -130,22 +130,33 @@ mod tests {
         assert!(noise.outliers.is_some_and(|(fraction, _)| (0.01..0.04).contains(&fraction)), "{noise:?}");
     }
 
+    /// Returns errors of readings with a noise of 1 V that are rounded to steps of 5 V, `off` by the row's, and as what they are observed.
+    fn rounded(off: impl Fn(usize) -> f64) -> (Vec<f64>, Observed) {
+        let step = 5.0;
+        let error = |(row, noise): (usize, &f64)| {
+            // The true value may lie anywhere in a cell.
+            let truth = 0.37 * row as f64;
+            ((truth + noise + off(row)) / step).round() * step - truth
+        };
+        let errors = normals(3000).iter().enumerate().map(error).collect();
+        (errors, Observed { grid: Some(QuantisationGrid { step, low: step, high: step }), ..as_read(3000) })
+    }
+
+    #[test]
+    fn outliers_are_found_among_rounded_readings() {
+        let (errors, observed) = rounded(|row| if row % 50 == 7 { 40.0 } else { 0.0 });
+        let noise = Noise::fitted(&errors, &observed);
+        assert!(
+            noise.outliers.is_some_and(|(fraction, wide)| (fraction - 0.02).abs() < 0.002 && (wide - 40.0).abs() < 1.0)
+        );
+        assert!((noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
+        assert_eq!(Noise::fitted(&rounded(|_| 0.0).0, &observed).outliers, None);
+    }
+
     #[test]
     fn variance_of_rounding_is_subtracted() {
-        let step = 5.0;
-        let off: Vec<f64> = normals(3000)
-            .iter()
-            .enumerate()
-            .map(|(row, noise)| {
-                // The true value may lie anywhere in a cell.
-                let truth = 0.37 * row as f64;
-                ((truth + noise) / step).round() * step - truth
-            })
-            .collect();
-        let noise = Noise::fitted(
-            &off,
-            &Observed { grid: Some(QuantisationGrid { step, low: step, high: step }), ..as_read(3000) },
-        );
+        let (errors, observed) = rounded(|_| 0.0);
+        let noise = Noise::fitted(&errors, &observed);
         assert!(noise.half_step == 2.5 && (noise.sigma - 1.0).abs() < 0.1, "{noise:?}");
     }
 }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::noise::autocorrelation::Autocorrelation;
-use crate::noise::term::{HALF_LN_TAU, Term, in_cell, stopped};
+use crate::noise::term::{HALF_LN_TAU, Term, in_cell, mixture, stopped};
 use crate::record::observed::{Kind, Observed};
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
@@ -117,7 +117,11 @@ impl Noise {
             }
             Kind::Within(low, high) => Some(in_cell(residual + 0.5 * (low + high), self.marginal, 0.5 * (high - low))),
             Kind::Unreported(change) => Some(in_cell(residual, self.marginal, change)),
-            Kind::Exact if self.half_step > 0.0 => Some(in_cell(residual, self.sigma, self.half_step)),
+            Kind::Exact if self.half_step > 0.0 => {
+                let of = |scale: f64| in_cell(residual, scale, self.half_step);
+                let mixed = |(fraction, wide): (f64, f64)| mixture(fraction, of(self.sigma), of(wide));
+                Some(self.outliers.map_or_else(|| of(self.sigma), mixed))
+            }
             Kind::Exact => None,
         }
     }

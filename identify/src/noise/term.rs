@@ -58,3 +58,17 @@ pub(super) fn in_cell(residual: f64, sigma: f64, half_step: f64) -> (f64, Term) 
     let information = (score * score + (b * density(b) - a * density(a)) / probability).max(1e-3);
     (probability.ln(), Term { residual: side * sigma * score / information, weight: information / (sigma * sigma) })
 }
+
+/// Returns log-probability and term of a reading that is an outlier with a probability of `fraction`, from those of a reading that is
+/// none and of one that is.
+pub(super) fn mixture(fraction: f64, regular: (f64, Term), outlier: (f64, Term)) -> (f64, Term) {
+    let logs = [(1.0 - fraction).ln() + regular.0, fraction.ln() + outlier.0];
+    let largest = logs[0].max(logs[1]);
+    let log = largest + logs.iter().map(|log| (log - largest).exp()).sum::<f64>().ln();
+    let [regular, outlier] = [(logs[0], regular.1), (logs[1], outlier.1)].map(|(of, term)| {
+        let weight = (of - log).exp() * term.weight;
+        (weight, weight * term.residual)
+    });
+    let weight = (regular.0 + outlier.0).max(f64::MIN_POSITIVE);
+    (log, Term { residual: (regular.1 + outlier.1) / weight, weight })
+}
