@@ -9,8 +9,8 @@
 //! ```
 //!
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
-//! which do not respond to the voltage and correct no law; findings that exact equality of readings proves do not count), and that is
-//! left. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
+//! the largest), and that is left but for outliers. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -31,7 +31,7 @@ const IMPROBABLE: f64 = 0.1;
 /// Probability that all causes are true, below which they do not explain a record: a wrong explanation is worse than one more question.
 const LIKELY_TOGETHER: f64 = 0.8;
 
-/// Causes that do not respond to the voltage, so that they correct no law.
+/// Causes that do not respond to the voltage, so that they correct no law, and no other cause corrects them.
 const APART: [&str; 2] = ["hum", "outliers"];
 
 /// Causes that a drift, or what an earlier voltage left behind, may be taken for.
@@ -45,13 +45,17 @@ pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
     let largest_but = |index: usize| {
         // What equality of readings proves follows no law that another cause could correct.
-        let corrected = |other: usize| other != index && !findings[other].proved;
+        let corrected =
+            |other: usize| other != index && !findings[other].proved && !APART.contains(&findings[other].cause);
         let others = removed.iter().enumerate().filter(|(other, _)| corrected(*other));
         others.map(|(_, removed)| *removed).fold(0.0, f64::max)
     };
     let own = |(index, finding): (usize, &Finding)| {
         let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
-        let unknown = form + UNKNOWN_NOISE.get() * finding.rmse_after.powi(2);
+        // Outliers take no part in what a law may leave.
+        let outliers = findings.iter().position(|other| other.cause == "outliers").filter(|other| *other != index);
+        let left = finding.rmse_after.powi(2) - outliers.map_or(0.0, |outliers| removed[outliers]);
+        let unknown = form + UNKNOWN_NOISE.get() * left.max(0.0);
         if finding.proved { 1.0 } else { part(removed[index], unknown) }
     };
     let own: Vec<f64> = findings.iter().enumerate().map(own).collect();
@@ -197,6 +201,21 @@ mod tests {
         let mut findings = [finding("resonance", 1.02), finding("quantisation", 1.0)];
         with_unknown_laws(&mut findings);
         assert!(are_unlikely(&findings), "{findings:?}");
+    }
+
+    #[test]
+    fn outliers_leave_other_causes_as_likely_as_they_are_without() {
+        let alone = {
+            let mut findings = [finding("time-constant", 1.5)];
+            with_unknown_laws(&mut findings);
+            findings[0].probability
+        };
+        // The mean square error of the outliers is a part of what the time constant leaves.
+        let beside = Finding { rmse_before: 401.25f64.sqrt(), rmse_after: 20.0, ..finding("time-constant", 1.5) };
+        let mut findings = [beside, finding("outliers", 20.0)];
+        with_unknown_laws(&mut findings);
+        let probability = findings[0].probability;
+        assert!((probability - alone).abs() < 0.01 && alone > 0.9, "{probability} {alone}");
     }
 
     #[test]
