@@ -13,9 +13,11 @@
 //! rows place it, and the cost of the block accounts for the number of candidates. [`Engine::held_out_residual`] is
 //! reported as the held-out error: it searches the run in the rows outside the fold.
 
-use crate::effects::model::Model;
+use std::iter;
+
+use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
-use crate::fit::normal_equations::{Jacobian, damped_step, normal_equations};
+use crate::fit::normal_equations::{Jacobian, bounded_step, normal_equations};
 use crate::noise::Term;
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LEAST_INFORMATION;
@@ -134,7 +136,16 @@ impl<'f> FullFit<'f> {
 
         let places: Vec<usize> = columns.iter().map(|&column| self.jacobian.places[column]).collect();
         let (mut points, bounds) = (self.fit.model.points(), self.fit.model.coordinates(data));
-        if let Some(step) = damped_step(&normal, &gradient, 1e-6) {
+        let owners: Vec<&Block> =
+            self.fit.model.blocks.iter().flat_map(|(block, point)| iter::repeat_n(block, point.len())).collect();
+        // A part of a row's delay and of a share are the same to the readings, so that a share follows a delay that ends at its bound.
+        // Elsewhere a structure that only its bounds keep in place is not to gain from them.
+        let range = |&place: &usize| match owners[place].cause() {
+            "delay" => [bounds[place].lowest, bounds[place].highest].map(|end| end - points[place]),
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        let ranges: Vec<[f64; 2]> = places.iter().map(range).collect();
+        if let Some(step) = bounded_step(&normal, &gradient, &ranges, 1e-6) {
             for (&place, step) in places.iter().zip(step.iter()) {
                 points[place] = (points[place] + step).clamp(bounds[place].lowest, bounds[place].highest);
             }
@@ -155,7 +166,6 @@ impl<'f> FullFit<'f> {
 mod tests {
     use super::*;
     use crate::effects::index_of;
-    use crate::effects::model::Block;
     use crate::fit::simulator::Simulator;
     use crate::plant::base::Base;
     use crate::record::data::Data;

@@ -64,3 +64,53 @@ pub fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64)
     let step = scaled.cholesky()?.solve(&right).component_mul(&scale);
     step.iter().all(|value| value.is_finite()).then_some(step)
 }
+
+/// Returns the damped step in which no coordinate leaves the range of its changes, lowest and highest: the one that would leave it first
+/// ends there, and the others follow. `None` if the matrix is not positive definite.
+///
+/// Cut off one by one instead, coordinates that the readings hardly tell apart would no longer compensate each other.
+pub fn bounded_step(
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    ranges: &[[f64; 2]],
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let mut step = DVector::zeros(gradient.nrows());
+    let mut free: Vec<usize> = (0..ranges.len()).collect();
+    loop {
+        let rest = (gradient - normal * &step).select_rows(&free);
+        let of_free = damped_step(&normal.select_columns(&free).select_rows(&free), &rest, damping)?;
+        // The part of its change after which a coordinate is at the end of its range.
+        let reach = |index: usize| {
+            let change = of_free[index];
+            let end = ranges[free[index]][usize::from(change > 0.0)];
+            if change == 0.0 { f64::INFINITY } else { end / change }
+        };
+        let first = (0..free.len()).min_by(|&a, &b| reach(a).total_cmp(&reach(b)));
+        let Some(first) = first.filter(|&first| reach(first) < 1.0) else {
+            free.iter().zip(&of_free).for_each(|(&index, change)| step[index] = *change);
+            return Some(step);
+        };
+        let index = free.remove(first);
+        step[index] = ranges[index][usize::from(of_free[first] > 0.0)];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns of nearly the same shape, of which one may not move up.
+    #[test]
+    fn the_others_follow_a_coordinate_that_ends_at_its_bound() {
+        let normal = DMatrix::from_row_slice(2, 2, &[1.0, 0.999, 0.999, 1.0]);
+        // The step without bounds is [10, -8].
+        let gradient = &normal * DVector::from_row_slice(&[10.0, -8.0]);
+        let free = bounded_step(&normal, &gradient, &[[-20.0, 20.0]; 2], 0.0).unwrap();
+        assert!((free[0] - 10.0).abs() < 1e-6 && (free[1] + 8.0).abs() < 1e-6, "{free}");
+        let bounded = bounded_step(&normal, &gradient, &[[-20.0, 1.0], [-20.0, 20.0]], 0.0).unwrap();
+        let best = gradient[1] - 0.999;
+        assert!(bounded[0] == 1.0 && (bounded[1] - best).abs() < 1e-6, "{bounded}");
+        assert_eq!(bounded_step(&normal, &gradient, &[[0.0, 0.0]; 2], 0.0).unwrap(), DVector::zeros(2));
+    }
+}
