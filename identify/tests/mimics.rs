@@ -21,10 +21,20 @@ struct Spring {
     slow: (f64, f64),
     /// Part of the response that is lost under constant voltage, with its time constant, in s.
     leaks: (f64, f64),
+    /// Rows by which all is late.
+    late: usize,
 }
 
-const PAPER: Spring =
-    Spring { gain: 1.0, width_v: 0.0, bend: 0.0, share: 1.0 / 11.0, tau_s: 5.5, slow: (0.0, 40.0), leaks: (0.0, 30.0) };
+const PAPER: Spring = Spring {
+    gain: 1.0,
+    width_v: 0.0,
+    bend: 0.0,
+    share: 1.0 / 11.0,
+    tau_s: 5.5,
+    slow: (0.0, 40.0),
+    leaks: (0.0, 30.0),
+    late: 0,
+};
 
 /// The report on a record of held levels with noise of 1 V.
 fn report(spring: &Spring, levels: &[f64]) -> Report {
@@ -38,7 +48,8 @@ fn report(spring: &Spring, levels: &[f64]) -> Report {
         |state: &mut f64, target: f64, tau_s: f64| *state += (target - *state) * -f64::exp_m1(-SAMPLE_S / tau_s);
     let mut row = |index: usize| {
         let voltage_v = levels[index / HELD];
-        play = play.clamp(voltage_v - spring.width_v / 2.0, voltage_v + spring.width_v / 2.0);
+        let late_v = levels[index.saturating_sub(spring.late) / HELD];
+        play = play.clamp(late_v - spring.width_v / 2.0, late_v + spring.width_v / 2.0);
         let input = spring.gain * play * (1.0 + spring.bend * (play.abs() / 500.0 - 1.0));
         let ((part, slow_s), (lost, leak_s)) = (spring.slow, spring.leaks);
         let whole = spring.share * input + (1.0 - spring.share) * ((1.0 - part) * lag + part * slow);
@@ -105,4 +116,11 @@ fn one_level_shows_no_curve() {
     for levels in [&[0.0, 300.0, 300.0, 300.0, 300.0][..], &[0.0, 300.0, 300.0, 300.0, 0.0, 0.0, 0.0]] {
         assert_eq!(causes(&spring, levels), ["gain-error", "time-constant"]);
     }
+}
+
+/// Without the other, the delay is found too short, or the share too small.
+#[test]
+fn a_delay_and_a_share_are_found_together() {
+    let spring = Spring { share: 0.3, late: 17, ..PAPER };
+    assert_eq!(causes(&spring, &LOOPS), ["delay", "instantaneous-share"]);
 }

@@ -16,7 +16,7 @@ use crate::stats::median::median;
 
 /// A first-order spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FirstOrder {
+pub(crate) struct FirstOrder {
     /// Time constant, in s.
     pub tau_s: f64,
     /// Change of the settled reading per V, in the reading's unit.
@@ -38,7 +38,7 @@ const LONGEST: f64 = 3.0;
 const RIDGE: f64 = 1e-9;
 
 /// The rows of a record with a reading, and the voltage as a signal between all rows.
-pub(super) struct Rows<'r> {
+pub(crate) struct Rows<'r> {
     record: &'r Record,
     linear: bool,
     even: bool,
@@ -49,7 +49,7 @@ pub(super) struct Rows<'r> {
 impl<'r> Rows<'r> {
     /// Takes a record whose voltage is linear or held between rows, of a spring that responds to the voltage's magnitude if
     /// `even`.
-    pub(super) fn new(record: &'r Record, linear: bool, even: bool) -> Self {
+    pub(crate) fn new(record: &'r Record, linear: bool, even: bool) -> Self {
         let mut gaps: Vec<f64> = record.rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
         let length_s =
             record.rows.last().map_or(0.0, |last| last.time_s) - record.rows.first().map_or(0.0, |at| at.time_s);
@@ -62,7 +62,7 @@ impl<'r> Rows<'r> {
     }
 
     /// Returns the spring with the smallest squared error over all time constants; `None` for a record without any change.
-    pub(super) fn best(&self) -> Option<FirstOrder> {
+    pub(crate) fn best(&self) -> Option<FirstOrder> {
         let (shortest, longest) = self.range_s();
         let count = ((longest / shortest).ln() / RATIO.ln()).ceil().max(0.0) as i32;
         let fits = (0..=count).filter_map(|index| self.at(shortest * RATIO.powi(index)));
@@ -70,7 +70,7 @@ impl<'r> Rows<'r> {
     }
 
     /// Returns the best spring with a given time constant, in s.
-    pub(super) fn at(&self, tau_s: f64) -> Option<FirstOrder> {
+    pub(crate) fn at(&self, tau_s: f64) -> Option<FirstOrder> {
         let volts = |v: f64| if self.even { v.abs() } else { v };
         let rows = &self.record.rows;
         let (start_s, first_v) = (rows.first()?.time_s, volts(rows.first()?.voltage_v));

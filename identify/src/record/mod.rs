@@ -15,7 +15,7 @@ pub(crate) mod changes;
 pub mod clock;
 pub mod data;
 pub(crate) mod decay;
-mod first_order;
+pub(crate) mod first_order;
 pub(crate) mod folds;
 pub mod held;
 pub mod heteroscedasticity;

@@ -10,7 +10,7 @@ use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
 use crate::search::first_fits::{Start, first_fits};
-use crate::search::initial_models::initial_models;
+use crate::search::initial_models::{initial_models, late_models};
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::{negligible, robust_scale, root_mean_square};
@@ -46,6 +46,11 @@ pub trait Evaluator {
 
     /// Returns the models from which the search starts in addition to the simulation as it is given.
     fn initial_models(&self) -> Vec<Model> {
+        Vec::new()
+    }
+
+    /// Returns models with a delay, one of which is the best structure if the search finds none that is better.
+    fn late_models(&self) -> Vec<Model> {
         Vec::new()
     }
 
@@ -122,6 +127,10 @@ impl Evaluator for Engine<'_> {
     fn initial_models(&self) -> Vec<Model> {
         let relaxation = &self.base().relaxation;
         initial_models(self.data, relaxation.tau_s, relaxation.share, |cause| self.allows(cause))
+    }
+
+    fn late_models(&self) -> Vec<Model> {
+        late_models(self.data, self.base().relaxation.share, |cause| self.allows(cause))
     }
 
     fn fit(&mut self, model: Model) -> Fit {

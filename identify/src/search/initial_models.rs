@@ -1,18 +1,38 @@
-//! The models from which the search starts in addition to the simulation as it is given, if that is far from the record: the
-//! spring of a first-order fit, as causes; also with a lag in series, and with a lag and a delay, which are usual in records of
-//! other instruments and which the search, adding one cause after the other, may replace by several that mimic them.
+//! The models from which the search starts in addition to the simulation as it is given, and those that it compares with what it
+//! finds.
+//!
+//! If the simulation is far from the record: the spring of a first-order fit, as causes; also with a lag in series, and with a lag and a
+//! delay, which are usual in records of other instruments and which the search, adding one cause after the other, may replace by
+//! several that mimic them.
+//!
+//! Compared, if a delay lets a first-order fit explain more: that delay with the fit's instantaneous share, and half of it with a lag of
+//! the other half. A search that adds one after the other does not find both: alone, a delay in front of a share or of a lag is found
+//! too short or too long, and there the other does not help.
 
 use crate::effects::effect::FitContext;
 use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::record::data::Data;
+use crate::record::first_order::{FirstOrder, Rows};
 use crate::record::normalisation::Start;
+use simulation::record::{Record, Row};
 
 /// Form of `reading-offset` that shifts all readings.
 const ALL_READINGS: usize = 1;
 /// Smallest difference from the nominal spring that is a cause: of the natural logarithms of gain and time constant, of the
 /// instantaneous share, and of the zero in full scales.
 const SMALLEST_DIFFERENCE: f64 = 0.03;
+
+/// A delay is believed with which a first-order fit leaves less than this fraction of the squared error of the fit without.
+const BELIEVED: f64 = 0.8;
+/// Ratio of neighbouring delays that are tried, and of neighbouring time constants; number of these on either side of the best without
+/// a delay.
+const RATIO: f64 = 1.25;
+const TIME_CONSTANTS: i32 = 5;
+/// Longest delay, in lengths of the record.
+const LONGEST: f64 = 0.1;
+/// Most rows of a fit with a delay.
+const ROWS: usize = 2000;
 
 /// Lag and delay at the start, as fractions of the time constant of the first-order fit.
 const LAG: f64 = 0.2;
@@ -42,6 +62,49 @@ pub(super) fn initial_models(data: &Data, tau_s: f64, share: f64, allows: impl F
         .and_then(|lagged| Some(lagged.with(block("delay", 0), delay_near(lag_s, data)?)));
     let all = std::iter::once(model).chain(with_share).chain(lagged).chain(late);
     all.filter(|model| !model.blocks.is_empty()).collect()
+}
+
+/// Returns the models with a delay, of the causes that the search `allows`, of a spring that has `share`; none if a delay explains nothing.
+pub(super) fn late_models(data: &Data, share: f64, allows: impl Fn(&str) -> bool) -> Vec<Model> {
+    let Some((delay_s, fit)) = late(data).filter(|_| allows("delay")) else { return Vec::new() };
+    let late = |delay_s: f64| Some(Model::default().with(block("delay", 0), delay_near(delay_s, data)?));
+    let found = fit.share.clamp(0.0, 1.0);
+    let differs = (found - share).abs() > SMALLEST_DIFFERENCE && allows("instantaneous-share");
+    let with_share = differs.then(|| Some(late(delay_s)?.with(block("instantaneous-share", 0), vec![found])));
+    let half_s = 0.5 * delay_s;
+    let is_long = half_s > data.sample_s && allows("series-lag");
+    let with_lag = is_long.then(|| Some(late(half_s)?.with(block("series-lag", 0), vec![half_s.ln()])));
+    [with_share, with_lag].into_iter().flatten().flatten().collect()
+}
+
+/// Returns the delay, in s, with which a first-order fit leaves the smallest error, and that fit; `None` if it leaves about as much as
+/// the fit without.
+fn late(data: &Data) -> Option<(f64, FirstOrder)> {
+    if !data.uniform || data.is_joined() {
+        return None;
+    }
+    let every = data.rows().div_ceil(ROWS);
+    let rows: Vec<usize> = (0..data.rows()).step_by(every).collect();
+    let fitted = |late: usize, range_s: Option<f64>| {
+        let row = |&row: &usize| Row {
+            line: row,
+            time_s: data.time_s[row],
+            voltage_v: data.voltage_v[row.saturating_sub(late)],
+            measured: Some(data.reading[row]),
+        };
+        let record = Record { name: String::new(), rows: rows.iter().map(row).collect() };
+        let of = Rows::new(&record, false, data.normalisation.even);
+        let Some(tau_s) = range_s else { return of.best() };
+        let fits = (-TIME_CONSTANTS..=TIME_CONSTANTS).filter_map(|step| of.at(tau_s * RATIO.powi(step)));
+        fits.min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))
+    };
+    let without = fitted(0, None)?;
+    let longest = (LONGEST * data.rows() as f64) as usize;
+    let delays = std::iter::successors(Some(1), |&late: &usize| Some((late + 1).max((late as f64 * RATIO) as usize)));
+    let fits = delays.take_while(|late| *late <= longest);
+    let fits = fits.filter_map(|late| Some((late as f64 * data.sample_s, fitted(late, Some(without.tau_s))?)));
+    let best = fits.min_by(|a, b| a.1.unexplained.total_cmp(&b.1.unexplained));
+    best.filter(|(_, fit)| fit.unexplained < BELIEVED * without.unexplained)
 }
 
 /// Returns the initial point of a delay that is closest to a time, in s.

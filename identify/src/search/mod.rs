@@ -22,7 +22,7 @@
 //! | `warm_start` | what one search passes to another |
 //! | `predicted_gain` | the predicted gain of a block |
 //! | `penalty_factor` | the penalty factor of a residual |
-//! | `initial_models` | models from which the search also starts, if the nominal spring is far from the record |
+//! | `initial_models` | models from which the search also starts, if the nominal spring is far from the record, and models with a delay |
 //! | `evaluator` | what a search asks about structures, and its answer from a record |
 //! | `first_fits` | first fits of a structure's extensions |
 //! | `evaluated` | all structures evaluated so far, and the prices |

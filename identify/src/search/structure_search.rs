@@ -69,6 +69,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     /// becomes the best.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
         self.evaluator.reserve_for_rare_forms();
+        for model in self.evaluator.late_models() {
+            self.evaluated.evaluate_from(self.evaluator, model);
+        }
         loop {
             let best = self.pass(&mut progress);
             let penalty_factor = self.evaluator.penalty_factor(&best.fit);
