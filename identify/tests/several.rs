@@ -91,6 +91,23 @@ fn a_cause_in_one_record_only_is_a_fault_of_that_record() {
     assert_eq!(report.verdict, Verdict::Explained);
 }
 
+/// A shift of the readings from the middle of one record on, in V, has a part in its zero, and biases what all records share.
+#[test]
+fn a_shift_in_one_record_is_found_beside_a_shared_cause_and_nothing_else() {
+    const SHIFT_V: f64 = 12.0;
+    let volts = [300.0, 0.0, 500.0, 250.0, 100.0];
+    let mut records = ["first", "second", "third one"].map(|name| record(name, 1.0, 6.0, &Test { volts, ..PLAIN }));
+    records[1].rows[270..].iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + SHIFT_V));
+    let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
+    let report = &several.report;
+    assert_eq!((report.verdict, causes(&several)), (Verdict::Explained, vec!["time-constant"]), "{report:#?}");
+    let tau = &report.findings[0].parameters[0].1;
+    assert!(report.findings[0].probability > 0.95 && tau.low < 6.0 && 6.0 < tau.high, "{:?}", report.findings);
+    let faults = report.records.iter().map(|of| of.findings.iter().map(|finding| finding.cause).collect());
+    assert_eq!(faults.collect::<Vec<Vec<&str>>>(), [vec![], vec!["reading-offset"], vec![]], "{:#?}", report.records);
+    assert!(report.records[1].findings[0].probability > 0.95, "{:#?}", report.records);
+}
+
 /// A gain that is off by 0.12 %, with a noise of 2 V: most records do not show it alone.
 #[test]
 fn a_cause_that_most_records_do_not_show_alone_is_found_in_all_of_them() {

@@ -159,8 +159,7 @@ impl Effect for ReadingOffset {
                 several.into_iter().collect()
             }
             DECAY | RAMPS => passing(form, context).into_iter().collect(),
-            // The zero of an identified spring is estimated with every set of causes.
-            _ if !context.data.normalisation.identified && shows_at_rest(context.data) => {
+            _ if !context.data.estimates_zero() && shows_at_rest(context.data) => {
                 vec![vec![-context.sigma], vec![context.sigma]]
             }
             _ => Vec::new(),

@@ -28,6 +28,7 @@ use crate::examine::hypothesis::hypothesise;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
+use crate::fit::simulator::Simulator;
 use crate::nominal::{BestLinear, best_linear};
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
@@ -140,6 +141,24 @@ impl Normalised {
         if is_better { self } else { other }
     }
 
+    /// Returns the record of this diagnosis as it would be without the causes that were found, but for those that `stay`.
+    pub(super) fn without_causes(&self, record: &Record, stay: impl Fn(&str) -> bool) -> Record {
+        let Diagnosis { data, base, extended, .. } = &self.found;
+        let mut simulator = Simulator::new(data, base);
+        let [mut with, mut without] = [Vec::new(), Vec::new()];
+        simulator.run(&extended.model, &mut with);
+        let mut rest = extended.model.clone();
+        rest.blocks.retain(|(block, _)| stay(block.cause()));
+        simulator.run(&rest, &mut without);
+        let reading = data.scales().reading;
+        let mut changes = with.iter().zip(&without).map(|(with, without)| reading * (with - without));
+        let mut less = record.clone();
+        for measured in less.rows.iter_mut().filter_map(|row| row.measured.as_mut()) {
+            *measured -= changes.next().unwrap_or(0.0);
+        }
+        less
+    }
+
     /// Returns the diagnosis in the units of its records, without the rival sets of causes.
     pub(super) fn without_rivals(self, records: &[Record]) -> Diagnosis {
         self.found.restored(records, &self.normalisations)
@@ -191,7 +210,8 @@ fn under(
 ) -> Result<Normalised> {
     let mut normalisations = Normalisation::of_each(records, base.file(), options.input, &options.units);
     for of in &mut normalisations {
-        (of.unsettled, of.identified, of.decays) = (options.unsettled, options.identified, options.decays);
+        (of.unsettled, of.decays) = (options.unsettled, options.decays);
+        (of.identified, of.zero_unknown) = (options.identified, options.zero_unknown);
     }
     let normalised: Vec<Record> = records.iter().zip(&normalisations).map(|(record, of)| of.record(record)).collect();
     let nominal = nominal(&options.plant, base);

@@ -14,18 +14,18 @@ use std::ops::Range;
 
 use anyhow::Result;
 
+use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
-use crate::answer::{RecordReport, Report, Verdict};
-use crate::effects::EFFECTS;
+use crate::answer::{Finding, RecordReport, Report, Verdict};
+use crate::effects::{EFFECTS, index_of};
 use crate::examine::options::Options;
-use crate::examine::passes::{self, examine, informative, joint, reports_changes, withhold};
+use crate::examine::passes::{self, Normalised, examine, informative, joint, reports_changes, withhold};
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
-use crate::stats::median::median;
 use crate::stats::scale::root_mean_square;
-use crate::stats::thresholds::probability::{CLEARLY_LIKELIER, Z_ZERO};
+use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
@@ -34,6 +34,8 @@ use crate::verdict::linear_rival::compare;
 
 /// Causes that are looked for in each record alone: a hum has a phase of its own in each, and each has a zero of its own.
 const OF_ONE_RECORD: [&str; 2] = ["hum", "reading-offset"];
+/// Largest number of times that the shared causes are found again, without the faults of single records.
+const ROUNDS: usize = 3;
 
 /// Finds out what the simulation gets wrong on several records of one spring, together and, in the report's `records`, each
 /// beyond the shared causes; `progress` receives the names of the best causes so far, separated by commas. A single record is
@@ -62,50 +64,40 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         shown.extend(alone.found.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
-    let mut joint = joint(records, options, Some(&shown), &mut progress)?;
-    let all: Vec<&'static str> =
-        EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
-    let all = options.causes().map_or(all, <[_]>::to_vec);
-    let weak = self::joint(records, options, Some(&all), &mut progress)?;
-    let clearly_likelier = weak.found.score > joint.found.score + CLEARLY_LIKELIER;
-    if clearly_likelier && predicts_most_records_better(&weak.found, &joint.found) {
-        joint = weak;
-    }
-    let mut joint = joint.with_rivals(records, options);
-    // Shared causes that a plant file cannot hold would be found again in every record; these are not listed twice.
-    let mut spring = joint.plant.clone();
-    spring.unmodelled = None;
-    let plant = "the spring with the shared causes".to_owned();
-    let options = Options { plant, base: Base::new(spring)?, ..options.clone() };
-    // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let reports = |held: &Option<Held>| reports_changes(held.as_ref());
+    let mut joint = shared(records, records, options, &shown, &mut progress)?;
+    let mut each = of_each(records, &joint, options, &mut progress)?;
+    // A fault of one record biases what is found in all of them, and that in turn the fault.
+    for _ in 0..ROUNDS {
+        if !is_biased(&joint, &each) {
+            break;
+        }
+        // A cause of the spring that is found again in a record is what the bias left there.
+        let less =
+            |(record, alone): (&Record, &Normalised)| alone.without_causes(record, |cause| is_in_spring(&joint, cause));
+        let less: Vec<Record> = records.iter().zip(&each).map(less).collect();
+        joint = shared(&less, records, options, &shown, &mut progress)?;
+        each = of_each(records, &joint, options, &mut progress)?;
+    }
+    // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
         add_held(&mut joint.report, shared, &options.units);
     }
-    for ((record, held), mut offset) in records.iter().zip(&held).zip(joint.zero_offsets.clone()) {
-        let mut from = |offset: f64| {
-            let from_zero = Record { rows: record.rows.iter().map(|row| row.less(offset)).collect(), ..record.clone() };
-            let from_zero = std::slice::from_ref(&from_zero);
-            let alone = self::joint(from_zero, &options, options.causes(), &mut |of| {
-                progress(&format!("{}: {of}", record.name))
-            })?;
-            anyhow::Ok(alone.without_rivals(from_zero))
-        };
-        let mut alone = from(offset)?;
-        // A shifted stretch had a part in the zero that the joint fit found.
-        let left = median(&mut alone.extended.residual.clone()).unwrap_or(0.0);
-        let chance = Z_ZERO * alone.report.noise.sigma / (alone.data.rows() as f64).sqrt();
-        let shifted = alone.report.findings.iter().any(|finding| finding.cause == "reading-offset");
-        if shifted && left.abs() > chance {
-            offset += left;
-            alone = from(offset)?;
-        }
+    for (index, (alone, held)) in each.into_iter().zip(&held).enumerate() {
+        let record = &records[index];
+        let mut alone = alone.without_rivals(std::slice::from_ref(record));
+        let offset = joint.zero_offsets[index] + alone.zero_offsets[0];
         if let Some(held) = held {
             add_held(&mut alone.report, held, &options.units);
         }
         joint.report.complete &= alone.report.complete;
-        joint.report.records.push(of_record(&joint, &alone, &record.name, offset));
+        let of = of_record(&joint, &alone, &record.name, offset);
+        // A linear model of all records follows a fault of one, so that the causes are judged with it as well.
+        if let Some(part) = joint.data.parts.get(index).filter(|_| !of.findings.is_empty()) {
+            joint.held_out_in_place[part.rows.clone()].copy_from_slice(&alone.held_out_in_place);
+        }
+        joint.report.records.push(of);
     }
     let verdict = verdict(&joint);
     if verdict == Verdict::Unexplained && joint.report.verdict != verdict {
@@ -114,7 +106,7 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
     }
     (joint.report.verdict, joint.report.rows) = (verdict, rows);
-    withhold(&mut joint.report, &options);
+    withhold(&mut joint.report, options);
     if verdict == Verdict::Explained {
         joint.report.suspects.clear();
     }
@@ -125,6 +117,52 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     Ok(joint)
 }
 
+/// True if some record has a fault, and either no causes explain all records or one of them is found in that record again.
+fn is_biased(joint: &Diagnosis, each: &[Normalised]) -> bool {
+    let mut likely = each.iter().flat_map(|alone| &alone.found.report.findings).filter(|finding| finding.is_likely());
+    let explained = matches!(joint.report.verdict, Verdict::Explained | Verdict::Consistent);
+    if explained { likely.any(|finding| is_in_spring(joint, finding.cause)) } else { likely.next().is_some() }
+}
+
+/// The causes that all records share, those of `shown` or clearly likelier ones; `files` are the records as they were read.
+fn shared(
+    records: &[Record],
+    files: &[Record],
+    options: &Options,
+    shown: &[&'static str],
+    progress: &mut dyn FnMut(&str),
+) -> Result<Diagnosis> {
+    let joint = joint(records, options, Some(shown), progress)?;
+    let all: Vec<&'static str> =
+        EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
+    let all = options.causes().map_or(all, <[_]>::to_vec);
+    let weak = self::joint(records, options, Some(&all), progress)?;
+    let clearly_likelier = weak.found.score > joint.found.score + CLEARLY_LIKELIER;
+    let is_weak = clearly_likelier && predicts_most_records_better(&weak.found, &joint.found);
+    let found = if is_weak { weak } else { joint };
+    Ok(found.with_rivals(files, options))
+}
+
+/// The diagnosis of each record on its own, against the spring with the causes that all records share, and from its zero.
+fn of_each(
+    records: &[Record],
+    joint: &Diagnosis,
+    options: &Options,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Vec<Normalised>> {
+    let spring = PlantFile { unmodelled: None, ..joint.plant.clone() };
+    let plant = "the spring with the shared causes".to_owned();
+    // What no plant file holds is found again in each record.
+    let base = Base::new(spring).unwrap_or_else(|_| options.base.clone());
+    let options = Options { plant, base, zero_unknown: true, ..options.clone() };
+    let alone = |(record, offset): (&Record, &f64)| {
+        let from_zero = Record { rows: record.rows.iter().map(|row| row.less(*offset)).collect(), ..record.clone() };
+        let mut of_this = |causes: &str| progress(&format!("{}: {causes}", record.name));
+        self::joint(std::slice::from_ref(&from_zero), &options, options.causes(), &mut of_this)
+    };
+    records.iter().zip(&joint.zero_offsets).map(alone).collect()
+}
+
 /// True if a diagnosis predicts more than half of the records better than another one, each by a fit to the other records.
 fn predicts_most_records_better(one: &Diagnosis, other: &Diagnosis) -> bool {
     let parts = &one.data.parts;
@@ -133,9 +171,18 @@ fn predicts_most_records_better(one: &Diagnosis, other: &Diagnosis) -> bool {
     2 * better > parts.len()
 }
 
-/// What is found in one record beyond the causes that all records share.
+/// True if the extended spring, as a plant file, holds a cause that all records share.
+fn is_in_spring(joint: &Diagnosis, cause: &str) -> bool {
+    let is_in_model = index_of(cause).is_some_and(|effect| joint.extended.model.has(effect));
+    let is_unmodelled = joint.plant.unmodelled.as_ref().is_some_and(|causes| causes.contains_key(cause));
+    is_in_model && !is_unmodelled
+}
+
+/// What is found in one record beyond the causes that all records share. One that the extended spring holds is found in a record again
+/// only if it is larger or smaller there.
 fn of_record(joint: &Diagnosis, alone: &Diagnosis, name: &str, offset: f64) -> RecordReport {
-    let shared = |cause: &str| joint.report.findings.iter().any(|finding| finding.cause == cause);
+    let is_shared = |of: &Finding| joint.report.findings.iter().any(|it| it.cause == of.cause && it.is_likely());
+    let shared = |finding: &Finding| is_shared(finding) && !is_in_spring(joint, finding.cause);
     let report = &alone.report;
     RecordReport {
         name: name.to_owned(),
@@ -144,7 +191,7 @@ fn of_record(joint: &Diagnosis, alone: &Diagnosis, name: &str, offset: f64) -> R
         sigma: report.noise.sigma,
         rmse: report.extended.quality.rmse,
         verdict: report.verdict,
-        findings: report.findings.iter().filter(|finding| !shared(finding.cause)).cloned().collect(),
+        findings: report.findings.iter().filter(|finding| !shared(finding)).cloned().collect(),
         leftover: report.leftover.clone(),
     }
 }

@@ -252,7 +252,7 @@ impl<'a> Engine<'a> {
 
     /// Returns true if the prediction has kernels besides the zero of each of several records.
     fn has_kernels(&self) -> bool {
-        self.data.initial_state_unknown || self.data.normalisation.identified
+        self.data.initial_state_unknown || self.data.estimates_zero()
     }
 
     /// Returns reading minus prediction of each row, in V, without an estimate of the initial state.
@@ -393,12 +393,12 @@ impl<'a> Engine<'a> {
         if second.log_likelihood >= first.log_likelihood { second } else { first }
     }
 
-    /// Returns the zero offset of each of several records at a fit, in V: what the estimated nuisance parameters add to the
+    /// Returns the zero offset of each record at a fit, in V: what the estimated nuisance parameters add to the
     /// prediction at the record's end, where its initial state has decayed.
     pub fn zero_offsets(&mut self, fit: &Fit) -> Vec<f64> {
         let mut predicted = Vec::new();
         self.simulator.run(&fit.model, &mut predicted);
-        let ends = self.data.parts.iter().map(|part| part.rows.end - 1);
+        let ends = self.data.rows_of_records().into_iter().map(|rows| rows.end - 1);
         ends.map(|row| self.data.reading[row] + self.observed.truncation_v - predicted[row] - fit.residual[row])
             .collect()
     }

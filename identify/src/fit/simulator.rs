@@ -174,8 +174,10 @@ impl<'a> Simulator<'a> {
         if self.data.initial_state_unknown {
             kernels.extend_from_slice(self.initial_state_kernels(model));
         }
-        if self.data.normalisation.identified {
+        if self.data.estimates_zero() {
             kernels.push(vec![1.0; readings.len()]);
+        }
+        if self.data.normalisation.identified {
             let full_scale_v = self.data.full_scale_v;
             kernels.push(self.response.value.iter().map(|stiffness| stiffness / full_scale_v).collect());
         }
@@ -227,8 +229,8 @@ impl<'a> Simulator<'a> {
             let change = self.change_by(model, states_v);
             readings.iter_mut().zip(change).for_each(|(reading, change)| *reading += change);
         }
-        if let [zero_v, gain_v] = reading_map {
-            let gain = gain_v / self.data.full_scale_v;
+        if let [zero_v, gain_v @ ..] = reading_map {
+            let gain = gain_v.first().map_or(0.0, |gain_v| gain_v / self.data.full_scale_v);
             let stiffness = self.response.value.iter();
             readings.iter_mut().zip(stiffness).for_each(|(reading, stiffness)| *reading += zero_v + gain * stiffness);
         }

@@ -212,9 +212,14 @@ impl Data {
     }
 
     /// Returns true if a model's prediction has parameters that are estimated for each model: an unknown initial state, a zero of
-    /// each of several records, or gain and zero of a nominal spring that was identified from the same readings.
+    /// one or each of several records, or gain and zero of a nominal spring that was identified from the same readings.
     pub fn has_nuisances(&self) -> bool {
-        self.initial_state_unknown || self.normalisation.identified || self.is_joined()
+        self.initial_state_unknown || self.estimates_zero() || self.is_joined()
+    }
+
+    /// Returns true if the zero of a single record's readings is estimated for each model.
+    pub fn estimates_zero(&self) -> bool {
+        self.normalisation.identified || self.normalisation.zero_unknown
     }
 
     /// Returns false if a prediction that is not linear in the initial state cannot be fitted: that of one of several records is

@@ -320,7 +320,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         held_out: [held_out.clone(), held_out],
         ranking: Vec::new(),
         equation: None,
-        zero_offsets: vec![0.0; data.parts.len()],
+        zero_offsets: vec![0.0; data.rows_of_records().len()],
         observed: engine.observed.clone(),
         base: engine.base().clone(),
         contenders: Vec::new(),
