@@ -10,7 +10,8 @@
 //!
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
-//! the largest), and that is left but for outliers. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and that
+//! is left but for outliers. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -40,15 +41,16 @@ const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series
 /// Causes that are linear dynamics of the spring, of which an identified one has its own.
 const LINEAR: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
 
-/// Lowers probabilities by the chance that a law which no cause describes is behind a finding.
-pub(crate) fn with_unknown_laws(findings: &mut [Finding]) {
+/// Lowers probabilities by the chance that a law which no cause describes is behind a finding; `power` is the mean square of the readings
+/// about their mean, in the squared unit of the findings' errors.
+pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
     let largest_but = |index: usize| {
         // What equality of readings proves follows no law that another cause could correct.
         let corrected =
             |other: usize| other != index && !findings[other].proved && !APART.contains(&findings[other].cause);
         let others = removed.iter().enumerate().filter(|(other, _)| corrected(*other));
-        others.map(|(_, removed)| *removed).fold(0.0, f64::max)
+        others.map(|(_, removed)| *removed).fold(0.0, f64::max).min(power)
     };
     let own = |(index, finding): (usize, &Finding)| {
         let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
@@ -186,34 +188,45 @@ mod tests {
     #[test]
     fn small_corrections_of_a_large_cause_are_less_likely_than_causes_of_their_own() {
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 1.3), finding("quantisation", 1.0)];
-        with_unknown_laws(&mut findings);
+        with_unknown_laws(&mut findings, f64::MAX);
         let [large, small, exact] = probabilities(&findings)[..] else { panic!() };
         // Some law is then unknown.
         assert!((0.9..0.95).contains(&large) && small < 0.3 && exact == 1.0, "{large} {small} {exact}");
         // A bound that the search found, in front of the noise, is proved by nothing.
         let mut findings = [finding("hysteresis", 20.0), finding("sensor-saturation", 1.3)];
-        with_unknown_laws(&mut findings);
+        with_unknown_laws(&mut findings, f64::MAX);
         assert!(probabilities(&findings)[1] < 0.3, "{findings:?}");
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
-        with_unknown_laws(&mut findings);
+        with_unknown_laws(&mut findings, f64::MAX);
         assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
         assert!(!are_unlikely(&findings) && !are_unlikely(&[]));
         let mut findings = [finding("resonance", 1.02), finding("quantisation", 1.0)];
-        with_unknown_laws(&mut findings);
+        with_unknown_laws(&mut findings, f64::MAX);
         assert!(are_unlikely(&findings), "{findings:?}");
+    }
+
+    /// The simulation was 1000 times too large.
+    #[test]
+    fn a_gain_that_is_far_off_leaves_other_causes_as_likely_as_one_of_the_readings_size() {
+        let mut findings = [finding("gain-error", 1e5), finding("time-constant", 5.0)];
+        with_unknown_laws(&mut findings, 1e4);
+        let mut close = [finding("gain-error", 100.0), finding("time-constant", 5.0)];
+        with_unknown_laws(&mut close, 1e4);
+        let [far, close] = [findings, close].map(|findings| probabilities(&findings)[1]);
+        assert!((far - close).abs() < 0.01 && far > 0.1, "{far} {close}");
     }
 
     #[test]
     fn outliers_leave_other_causes_as_likely_as_they_are_without() {
         let alone = {
             let mut findings = [finding("time-constant", 1.5)];
-            with_unknown_laws(&mut findings);
+            with_unknown_laws(&mut findings, f64::MAX);
             findings[0].probability
         };
         // The mean square error of the outliers is a part of what the time constant leaves.
         let beside = Finding { rmse_before: 401.25f64.sqrt(), rmse_after: 20.0, ..finding("time-constant", 1.5) };
         let mut findings = [beside, finding("outliers", 20.0)];
-        with_unknown_laws(&mut findings);
+        with_unknown_laws(&mut findings, f64::MAX);
         let probability = findings[0].probability;
         assert!((probability - alone).abs() < 0.01 && alone > 0.9, "{probability} {alone}");
     }

@@ -14,6 +14,8 @@ use crate::record::observed::{Kind, Observed};
 use crate::record::scales::Scales;
 use crate::search::{Scored, WarmStart};
 
+use crate::stats::scale::centred;
+use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
 use crate::verdict::credibility;
@@ -117,7 +119,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
 
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let mut findings = findings(engine, &found);
-    credibility::with_unknown_laws(&mut findings);
+    credibility::with_unknown_laws(&mut findings, power(&data.reading));
     if data.normalisation.decays {
         credibility::of_slow(&mut findings);
     }
@@ -213,6 +215,12 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         warm_start: Some(found.warm_start),
         extended: found.best.fit,
     }
+}
+
+/// Returns the mean square of readings about their mean.
+pub(crate) fn power(reading: &[f64]) -> f64 {
+    let centred = centred(reading);
+    dot(&centred, &centred) / centred.len() as f64
 }
 
 /// All findings, the one that explains the largest mean square error first.
