@@ -229,6 +229,7 @@ impl<'a> Table<'a> {
                 bad_input!("{name}, line {line}: {found} field(s){why}; expected {expected} as in the header{hint}");
             }
         }
+        self.numbers.check()?;
         Ok(false)
     }
 }
@@ -309,7 +310,7 @@ impl Row<'_> {
 
     /// The number in a cell, `None` if it has none; NaN and infinities are numbers here.
     fn any_number(&self, column: usize) -> Result<Option<f64>> {
-        self.numbers.parse(self.text(column), self.line, || self.place(column))
+        self.numbers.parse(self.text(column), column, self.line, || self.place(column))
     }
 
     /// True if a cell holds a finite number.

@@ -367,6 +367,37 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
 }
 
 #[test]
+fn a_mark_that_may_separate_thousands_is_asked_for() {
+    let forced = |decimal: &str| {
+        let decimal = decimal.parse().ok();
+        Format { dialect: simulation::csv_table::dialect::Dialect { separator: None, decimal }, ..Format::default() }
+    };
+    let voltages = |text: &str, decimal: &str| {
+        read(text, &forced(decimal)).map(|read| read.record.rows.iter().map(|row| row.voltage_v).collect::<Vec<_>>())
+    };
+    let doubtful = "t_s;u_V;x_mm\n0;0;10\n1;800;11\n2;1,200;12\n";
+    assert_eq!(
+        voltages(doubtful, "").unwrap_err(),
+        "r.csv, line 4, column u_V: `1,200` can have a decimal comma or a separator of thousands; expected numbers without \
+         separators of thousands, or --decimal ,"
+    );
+    assert_eq!(voltages(doubtful, ","), Ok(vec![0.0, 800.0, 1.2]));
+    assert!(voltages(doubtful, ".").unwrap_err().contains("`1,200` is not a finite number (without separators"));
+    let points = doubtful.replace(',', ".").replace(';', "\t");
+    assert!(voltages(&points, "").unwrap_err().ends_with("or --decimal ."), "{points}");
+    for decimals in [
+        // Three decimals everywhere, zeros in front, another number of decimals in any column, four digits without a mark.
+        "t_s;u_V;x_mm\n0;1,125;2,125\n1;1,125;2,250\n",
+        "t_s;u_V;x_mm\n0;0;12,345\n1;0,125;12,345\n",
+        "t_s;u_V;x_mm\n0;0;1,5\n1;1,125;12,345\n",
+        "t_s;u_V;x_mm\n0;1000;10\n1;0;10\n2;1,125;12\n",
+        "t_s,u_V,x_mm\n0,0,10\n1,1.125,10\n",
+    ] {
+        assert!(voltages(decimals, "").is_ok(), "{decimals}: {:?}", voltages(decimals, ""));
+    }
+}
+
+#[test]
 fn a_header_that_could_be_another_line_is_refused_with_both_lines() {
     let rows = "0;0;1\n1;0;2\n";
     let error = |text: String| read(text, &Format::default()).unwrap_err();

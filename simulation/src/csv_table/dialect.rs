@@ -1,6 +1,7 @@
 //! The dialect of a table: the character between its columns, the decimal mark, and the lines above its header.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use anyhow::Result;
@@ -87,18 +88,35 @@ pub(super) struct Numbers {
     accepted: Option<Decimal>,
     /// The first mark found, and its line.
     found: Cell<Option<(Decimal, usize)>>,
+    /// The columns by index, as long as the mark can separate thousands; `None` once it is a decimal mark.
+    columns: RefCell<Option<BTreeMap<usize, Grouped>>>,
+}
+
+/// The numbers of a column whose mark can separate thousands.
+#[derive(Default)]
+struct Grouped {
+    /// Place, text and mark of the first number such as `1,200`.
+    first: Option<(String, Decimal)>,
+    /// True if a whole number has up to three digits, as some have beside separated thousands.
+    has_short: bool,
+    /// True if a whole number has four digits or more, as none has where thousands are separated.
+    has_long: bool,
 }
 
 impl Numbers {
     /// Where commas separate the columns, a decimal comma has to be asked for.
     pub(super) fn new(dialect: Dialect, separator: Separator) -> Self {
         let point = (separator == Separator::COMMA).then_some(Decimal::Point);
-        Self { accepted: dialect.decimal.or(point), found: Cell::new(None) }
+        Self::of(dialect.decimal.or(point))
+    }
+
+    fn of(accepted: Option<Decimal>) -> Self {
+        Self { accepted, found: Cell::default(), columns: RefCell::new(accepted.is_none().then(BTreeMap::new)) }
     }
 
     /// True for a number with either decimal mark.
     pub(super) fn any(text: &str) -> bool {
-        Self { accepted: None, found: Cell::default() }.value(text).is_some()
+        Self::of(None).value(text).is_some()
     }
 
     /// The number in a cell, not necessarily finite; `None` if it is no number.
@@ -110,13 +128,20 @@ impl Numbers {
         }
     }
 
-    /// The number in a cell of line `line`, as [`Numbers::value`]; its decimal mark holds for all later ones.
+    /// The number in a cell of a column in line `line`, as [`Numbers::value`]; its decimal mark holds for all later ones.
     ///
     /// # Errors
     /// [`BadInput`] for a decimal mark other than that of an earlier line; `place` starts the message.
-    pub(super) fn parse(&self, text: &str, line: usize, place: impl Fn() -> String) -> Result<Option<f64>> {
-        let number = self.value(text);
-        let Some((number, mark)) = number.zip(Decimal::of(text)) else { return Ok(number) };
+    pub(super) fn parse(
+        &self,
+        text: &str,
+        column: usize,
+        line: usize,
+        place: impl Fn() -> String,
+    ) -> Result<Option<f64>> {
+        let Some(number) = self.value(text) else { return Ok(None) };
+        self.watch(text, column, &place);
+        let Some(mark) = Decimal::of(text) else { return Ok(Some(number)) };
         match self.found.get() {
             None => self.found.set(Some((mark, line))),
             Some((other, first)) if other != mark => bad_input!(
@@ -128,6 +153,52 @@ impl Numbers {
             Some(_) => (),
         }
         Ok(Some(number))
+    }
+
+    /// Notes what a number shows about the mark of the table.
+    fn watch(&self, text: &str, column: usize, place: impl Fn() -> String) {
+        let mut watched = self.columns.borrow_mut();
+        let Some(columns) = watched.as_mut() else { return };
+        let digits = text.trim_start_matches(['+', '-']);
+        let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+        match Decimal::of(digits).zip(digits.split_once([',', '.'])) {
+            Some((mark, (whole, part))) => {
+                let is_thousand = (1..=3).contains(&whole.len())
+                    && !whole.starts_with('0')
+                    && part.len() == 3
+                    && [whole, part].into_iter().all(are_digits);
+                if is_thousand {
+                    let first = &mut columns.entry(column).or_default().first;
+                    first.get_or_insert_with(|| (format!("{}: `{text}`", place()), mark));
+                } else {
+                    *watched = None;
+                }
+            }
+            None if are_digits(digits) => {
+                let column = columns.entry(column).or_default();
+                let seen = if digits.len() > 3 { &mut column.has_long } else { &mut column.has_short };
+                *seen = true;
+            }
+            None => (),
+        }
+    }
+
+    /// Checks, behind the last row, that the marks that were found are decimal marks.
+    ///
+    /// # Errors
+    /// [`BadInput`] for a column of whole numbers and of numbers such as `1,200`, which may be 1.2 or 1200.
+    pub(super) fn check(&self) -> Result<()> {
+        let columns = self.columns.borrow();
+        let doubtful = columns
+            .iter()
+            .flatten()
+            .find_map(|(_, column)| column.first.as_ref().filter(|_| column.has_short && !column.has_long));
+        let Some((first, mark)) = doubtful else { return Ok(()) };
+        let (name, option) = (mark.name(), if *mark == Decimal::Comma { ',' } else { '.' });
+        bad_input!(
+            "{first} can have a decimal {name} or a separator of thousands; expected numbers without separators of thousands, \
+             or --decimal {option}"
+        )
     }
 }
 
