@@ -17,6 +17,7 @@ use csv::StringRecord;
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
 use dialect::{Dialect, Numbers, Separator, has_thousands_separators};
+use header::are_names;
 use stream::{Stream, unwrapped};
 use text::Source;
 
@@ -44,6 +45,8 @@ pub struct Table<'a> {
     numbering: Numbering,
     header: StringRecord,
     header_line: usize,
+    /// Line of a comment that has as many names as the table has columns.
+    commented_header: Option<usize>,
     /// Line of a header with other text above it.
     below_titles: Option<usize>,
     separator: Separator,
@@ -88,6 +91,7 @@ impl<'a> Table<'a> {
             Numbering::Lines => text.skip_titles(dialect.separator.or(named))?,
             Numbering::Rows => (Separator::COMMA, None),
         };
+        let commented = text.last_comment().map(|(line, names)| (line, names.to_owned()));
         // Rows of another length are reported by [`Table::next_row`], which knows their line.
         let mut builder = csv::ReaderBuilder::new();
         builder.delimiter(separator.0).comment(Some(b'#')).trim(csv::Trim::All).flexible(true);
@@ -99,6 +103,8 @@ impl<'a> Table<'a> {
         keep_columns(&mut header, separator, |index| index <= last_name);
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
+        let commented_header =
+            commented.filter(|(_, names)| are_names(names, separator, header.len())).map(|(line, _)| line);
         // Numbers are no names: the error for a missing column says so.
         if !are_numbers(&header)
             && let Some((_, column)) = header.iter().enumerate().find(twice)
@@ -114,6 +120,7 @@ impl<'a> Table<'a> {
             numbering,
             header,
             header_line: line,
+            commented_header,
             below_titles,
             separator,
             numbers: Numbers::new(dialect, separator),
@@ -181,6 +188,11 @@ impl<'a> Table<'a> {
         if self.columns().any(unclosed) {
             return BadInput(format!("{place}: {UNCLOSED}; expected a header with {expected}"));
         }
+        if let Some(line) = self.commented_header.filter(|_| are_numbers(&self.header)) {
+            return BadInput(format!(
+                "{name}, line {line}: the names of the columns are a comment; expected a header: remove the mark in front of them"
+            ));
+        }
         if are_numbers(&self.header) {
             return BadInput(format!("{place}: numbers instead of names; expected a header with {expected}"));
         }
@@ -206,11 +218,14 @@ impl<'a> Table<'a> {
         self.is_returned = true;
     }
 
-    /// Reads the next row; `false` after the last.
+    /// Reads the next row; `false` after the last. Lines without content are no rows: spreadsheets write some below a table.
     fn advance(&mut self) -> Result<bool> {
         let expected = self.header.len();
         while self.reader.read_record(&mut self.record).map_err(unreadable)? {
             self.line = line_of(&self.record, &mut self.reader);
+            if self.numbering == Numbering::Lines && self.record.iter().all(str::is_empty) {
+                continue;
+            }
             if self.separator == Separator::BLANKS || self.record.len() > expected {
                 let is_trailing = self.record.iter().skip(expected).all(str::is_empty);
                 keep_columns(&mut self.record, self.separator, |index| index < expected || !is_trailing);

@@ -189,7 +189,7 @@ mod tests {
             ("", "data.csv: no header; expected one with time_s, voltage_v"),
             ("\n# a\n\n", "data.csv: no header; expected one with time_s, voltage_v"),
             ("# a\ntime_s,voltage_v,time_s\n0,1,2\n", "line 2: column `time_s` appears twice"),
-            ("time_s,voltage_v\n0,1\n  \n", "line 3: 1 field(s); expected 2"),
+            ("time_s,voltage_v\n0,1\n  \n", "1 row(s) of data; expected at least 2"),
             (
                 "time_s;voltage_v\n0;0\n1;500\n2;1,200\n",
                 "line 4, column voltage_v: `1,200` can have a decimal comma or",

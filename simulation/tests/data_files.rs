@@ -398,6 +398,25 @@ fn a_mark_that_may_separate_thousands_is_asked_for() {
 }
 
 #[test]
+fn rows_of_separators_are_blank_lines() {
+    let text = "t_s;u_V;x_mm\n0;0;1\n;;\n1;0;2\n;;\n;;\n";
+    let rows = read(text, &Format::default()).unwrap().record.rows;
+    assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 4]);
+    assert!(read("t_s;u_V;x_mm\n0;0;1\n;;5\n", &Format::default()).unwrap_err().contains("line 3, column t_s: ``"));
+}
+
+#[test]
+fn a_header_in_a_comment_is_named() {
+    let error = |text: &str| read(text, &Format::default()).unwrap_err();
+    assert_eq!(
+        error("# by numpy\n# t_s u_V x_mm\n0.0 0.0 1.5\n0.5 0.0 1.25\n"),
+        "r.csv, line 2: the names of the columns are a comment; expected a header: remove the mark in front of them"
+    );
+    assert!(error("% t_s,u_V,x_mm\n0.0,0.0,1.5\n0.5,0.0,1.25\n").starts_with("r.csv, line 1: the names"));
+    assert!(error("# two columns\n0.0,0.0,1.5\n0.5,0.0,1.25\n").starts_with("r.csv, line 2: numbers instead of names"));
+}
+
+#[test]
 fn a_header_that_could_be_another_line_is_refused_with_both_lines() {
     let rows = "0;0;1\n1;0;2\n";
     let error = |text: String| read(text, &Format::default()).unwrap_err();

@@ -24,7 +24,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
         *next += line.len();
         Some((start, line.trim_end_matches('\n')))
     });
-    let lines: Vec<(usize, &str)> = starts.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).collect();
+    let lines: Vec<(usize, &str)> = starts.filter(|(_, line)| has_content(line)).collect();
     let mut found: Vec<Candidate> = Vec::new();
     // Number of columns of the last header, as long as its rows go on.
     let mut table = None;
@@ -57,7 +57,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
 /// Returns the separator of a text that starts with its header: the one that is known, else of those that split the header
 /// the first for which the rows have as many columns.
 pub(super) fn separator(text: &str, known: Option<Separator>) -> Separator {
-    let mut lines = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let mut lines = text.lines().filter(|line| has_content(line));
     let header = lines.next().unwrap_or_default();
     let rows: Vec<&str> = lines.take(CHECKED_ROWS).collect();
     let splits: Vec<Separator> = separators(known, header).collect();
@@ -66,6 +66,17 @@ pub(super) fn separator(text: &str, known: Option<Separator>) -> Separator {
         rows.iter().all(|row| Cells::of(row, **separator).used == columns)
     };
     *splits.iter().find(fits).or(splits.first()).unwrap_or(&known.unwrap_or(Separator::COMMA))
+}
+
+/// True for a line of `columns` different names that are no numbers.
+pub(super) fn are_names(line: &str, separator: Separator, columns: usize) -> bool {
+    Cells::of(line, separator).are_names(columns)
+}
+
+/// False for a comment, and for a line of nothing but blanks and separators.
+fn has_content(line: &str) -> bool {
+    let is_separator = |letter: char| letter.is_whitespace() || ",;|".contains(letter);
+    !line.starts_with('#') && !line.chars().all(is_separator)
 }
 
 /// The separator that is known, else the usual ones, as far as they split a line.

@@ -35,6 +35,8 @@ pub(super) struct Stream<'a> {
     text: Vec<u8>,
     handed: usize,
     lines: Lines,
+    /// The last comment above the header, without its mark, and its line.
+    comment: Option<(usize, String)>,
     /// What the user should know about the encoding.
     remark: Option<String>,
 }
@@ -61,6 +63,7 @@ impl<'a> Stream<'a> {
             text: Vec::new(),
             handed: 0,
             lines: Lines::default(),
+            comment: None,
             remark: None,
         }
     }
@@ -68,7 +71,7 @@ impl<'a> Stream<'a> {
     /// Reads the comments above the header; returns the separator that a line among them names.
     pub(super) fn skip_preamble(&mut self) -> Result<Option<Separator>, BadInput> {
         let mut separator = None;
-        loop {
+        for number in 1.. {
             self.skip(0);
             let end = loop {
                 match self.pending().iter().position(|byte| *byte == b'\n') {
@@ -80,11 +83,19 @@ impl<'a> Stream<'a> {
             let line = whole_characters(&self.pending()[..end]);
             let named = Separator::named_by(line);
             if line.is_empty() || (named.is_none() && !is_above_header(line)) {
-                return Ok(separator);
+                break;
             }
+            let comment = line.trim().trim_start_matches(['#', '%', '/']);
+            self.comment = (!comment.is_empty()).then(|| (number, comment.to_owned())).or(self.comment.take());
             separator = named.or(separator);
             self.skip(end);
         }
+        Ok(separator)
+    }
+
+    /// The last comment above the header, without its mark, and its line.
+    pub(super) fn last_comment(&self) -> Option<(usize, &str)> {
+        self.comment.as_ref().map(|(line, text)| (*line, text.as_str()))
     }
 
     /// Reads the lines of text between the comments and the header; returns the separator of the columns, and the number of the
