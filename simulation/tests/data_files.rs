@@ -439,15 +439,32 @@ fn a_header_that_could_be_another_line_is_refused_with_both_lines() {
 fn a_line_of_units_is_used_where_it_fits_and_said_where_not() {
     let remarks = |text: &str| read(text, &Format::default()).map(|read| (read.units, read.remarks));
     let (units, said) = remarks("by X\nt_ms;u;stiffness\ns;kV;N/m\n0;0;1\n1;0;1\n").unwrap();
-    assert_eq!((&*units.time.name, &*units.voltage.name, &*units.reading), ("ms", "kV", "N/m"));
+    assert_eq!((&*units.time.name, &*units.voltage.name, &*units.reading), ("s", "kV", "N/m"));
     assert_eq!(
         said,
         [
             "r.csv: 1 line(s) above the header in line 2, skipped",
             "r.csv: units s, kV, N/m below the header",
-            "r.csv: column `t_ms` is read in ms, not in s",
+            "r.csv: column `t_ms` is read in s, not in ms",
         ]
     );
+    let asked =
+        Format { columns: ColumnNames { time: Some("t_ms:ms".into()), ..ColumnNames::default() }, ..Format::default() };
+    let in_ms = read("t_ms;u;stiffness\ns;kV;N/m\n0;0;1\n1;0;1\n", &asked).unwrap();
+    assert_eq!((&*in_ms.units.time.name, in_ms.remarks.len()), ("ms", 2), "an option wins: {:?}", in_ms.remarks);
+    let channels = Format {
+        columns: ColumnNames {
+            voltage: Some("Channel A".into()),
+            reading: Some("Channel B".into()),
+            ..ColumnNames::default()
+        },
+        ..Format::default()
+    };
+    let scope = read("Time,Channel A,Channel B\n(ms),(mV),(V)\n\n0,500,1\n1,0,1\n", &channels).unwrap();
+    assert_eq!((&*scope.units.time.name, &*scope.units.voltage.name, &*scope.units.reading), ("ms", "mV", "V"));
+    assert_eq!(scope.record.rows[0].voltage_v, 0.5);
+    // A word of the row is no unit for a column that has one.
+    assert_eq!(remarks("t_s,u_kV,stiffness\ns,off,V\n0,1,1\n1,0,1\n").unwrap().0.voltage.name, "kV");
     let stamps = "Time;u_V;x\nUTC;V;mm\n2026-01-31T00:00:02;1;4\n2026-01-31T00:00:03;0;0\n";
     assert_eq!(remarks(&stamps.replace(";x\n", ";stiffness\n")).unwrap().0.reading, "mm");
     assert_eq!(

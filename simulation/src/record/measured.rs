@@ -160,14 +160,19 @@ impl Format {
             (&columns.reading, reading, &units.reading, false),
         ] {
             let shown = excerpt(table.column(column.index));
+            let is_used = |below: &String| below == unit || usual(below).as_ref() == Some(unit);
+            let other = below.as_ref().and_then(|below| {
+                if is_used(below) { column.unit.as_ref().filter(|own| *own != unit) } else { Some(below) }
+            });
             match below {
-                Some(below) if below != unit && usual(below).as_ref() != Some(unit) => {
-                    remarks.push(format!("{name}: column `{shown}` is read in {unit}, not in {below}"));
+                Some(_) => {
+                    let not = other.map(|other| format!("{name}: column `{shown}` is read in {unit}, not in {other}"));
+                    remarks.extend(not);
                 }
                 None if needs_unit && column.unit.is_none() => {
                     remarks.push(format!("{name}: column `{shown}` has no unit; read in {unit}"));
                 }
-                _ => (),
+                None => (),
             }
         }
         if self.sort {
@@ -203,10 +208,15 @@ impl Format {
         Ok(MeasuredRecord { record, units, column, remarks })
     }
 
-    /// The units: those asked for or in the columns' names, else those in the row below the header, else s and V; a reading
-    /// has no unit unless its column is that of this program's records.
+    /// The units: those asked for, else usual ones in the row below the header, else those in the columns' names, else any in the
+    /// row, else s and V; a reading has no unit unless its column is that of this program's records.
     fn units(&self, columns: &Columns, below_header: &[Option<String>; 3]) -> Result<Units> {
-        let of = |column: &Column, index: usize| column.unit.clone().or_else(|| below_header[index].clone());
+        let of = |column: &Column, index: usize| {
+            let below = below_header[index].clone();
+            // The first row may be one of words, not of units.
+            let said = below.clone().filter(|unit| !column.is_asked && usual(unit).is_some());
+            said.or_else(|| column.unit.clone()).or(below)
+        };
         let default = Units::default();
         let time = match of(&columns.time, 0) {
             Some(unit) => Unit::of_time(&unit).map_err(|error| match &self.columns.time {

@@ -21,11 +21,13 @@ pub struct ColumnNames {
     pub stiffness: Option<String>,
 }
 
-/// A column of a table and its unit, as far as known from its name.
+/// A column of a table and its unit, as far as known from its name or an option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Column {
     pub(super) index: usize,
     pub(super) unit: Option<String>,
+    /// True if the unit is that of an option: no other one is then used.
+    pub(super) is_asked: bool,
 }
 
 /// The columns of a record.
@@ -191,7 +193,7 @@ impl ColumnNames {
 
 impl Column {
     fn at(table: &Table<'_>, index: usize) -> Self {
-        Self { index, unit: split_unit(table.column(index)).1 }
+        Self { index, unit: split_unit(table.column(index)).1, is_asked: false }
     }
 
     fn named(table: &Table<'_>, name: &str) -> Option<Self> {
@@ -200,7 +202,7 @@ impl Column {
 
     /// A column without unit.
     fn plain(table: &Table<'_>, name: &str) -> Option<Self> {
-        table.find(name).map(|index| Self { index, unit: None })
+        table.find(name).map(|index| Self { index, unit: None, is_asked: false })
     }
 
     /// The column `NAME` or `NAME:UNIT`; a column's own name may contain a colon, and a unit that is left out.
@@ -209,7 +211,7 @@ impl Column {
             let (name, unit) = asked.rsplit_once(':')?;
             let unit = Some(unit.trim().to_owned()).filter(|unit| !unit.is_empty());
             let column = Self::named(table, name).or_else(|| Self::without_unit(table, name))?;
-            Some(Self { unit, ..column })
+            Some(Self { is_asked: unit.is_some(), unit, ..column })
         };
         Self::named(table, asked).or_else(with_unit).or_else(|| Self::without_unit(table, asked))
     }
@@ -224,7 +226,7 @@ impl Column {
 }
 
 /// Splits a column's name into its base and its unit: `x [mm]`, `x (mm)`, `x / mm`, `x_mm`, `x mm`. In brackets any unit is
-/// one, elsewhere a usual one only.
+/// one, elsewhere a usual one only, and behind a blank or `_` none that is as often a label: `Channel A`.
 fn split_unit(name: &str) -> (&str, Option<String>) {
     let name = name.trim().trim_matches(['"', '\'', '\u{feff}']).trim();
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -235,18 +237,16 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
             return (base.trim_end_matches([' ', '_']), Some(usual(unit.trim()).unwrap_or(unit.trim().to_owned())));
         }
     }
-    let split = |at: Option<(&'_ str, &'_ str)>| {
-        at.filter(|(base, _)| !base.is_empty()).map(|(base, unit)| (base.len(), unit.len()))
-    };
-    for lengths in [
-        split(name.split_once('_')),
-        split(name.rsplit_once('_')),
-        split(name.split_once('/')),
-        split(name.rsplit_once(' ')),
-    ] {
-        let Some((base, unit)) = lengths else { continue };
-        if let Some(unit) = usual(name[name.len() - unit..].trim()) {
-            return (name[..base].trim_end(), Some(unit));
+    for (mark, at) in [('_', name.find('_')), ('_', name.rfind('_')), ('/', name.find('/')), (' ', name.rfind(' '))] {
+        let Some(at) = at.filter(|at| *at > 0) else { continue };
+        let unit = name[at + 1..].trim();
+        let is_label = match mark {
+            '_' => unit == "A",
+            ' ' => unit.len() == 1 && !["s", "h", "d", "V", "v"].contains(&unit),
+            _ => false,
+        };
+        if let Some(unit) = usual(unit).filter(|_| !is_label) {
+            return (name[..at].trim_end(), Some(unit));
         }
     }
     (name, None)
@@ -294,6 +294,12 @@ mod tests {
             ("t [\u{b5}s]", "t", Some("us")),
             ("flow [furlong/h]", "flow", Some("furlong/h")),
             ("dac_code", "dac_code", None),
+            ("Channel A", "Channel A", None),
+            ("phase_A", "phase_A", None),
+            ("node K", "node K", None),
+            ("I / A", "I", Some("A")),
+            ("F_N", "F", Some("N")),
+            ("Time s", "Time", Some("s")),
             ("Q1", "Q1", None),
             ("[mm]", "[mm]", None),
         ] {
