@@ -307,6 +307,11 @@ impl Row<'_> {
         &self.record[column]
     }
 
+    /// The texts of all cells.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = &str> {
+        self.record.iter()
+    }
+
     /// File, line and column of a cell, for messages.
     pub fn place(&self, column: usize) -> String {
         format!(

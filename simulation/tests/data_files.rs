@@ -511,6 +511,28 @@ fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
     assert_eq!(times(over_two_midnights), (expected, "s".to_owned(), from_first.clone()));
     let elapsed = "Time;u_V;x_mm\n0:00:00;0;1\n15:00:00;0;1\n31:00:00,25;0;1\n";
     assert_eq!(times(elapsed), (vec![0.0, 54000.0, 111_600.25], "s".to_owned(), from_first.clone()));
+    // The days are in a column of dates, of which one stays the same.
+    let dates = |first: &str, second: &str, third: &str| {
+        format!(
+            "Calibrated;Date;Time;u_V;x_mm\n1.1.2026;{first};10:00:00;0;1\n1.1.2026;{second};10:00:01;0;1\n\
+             1.1.2026;{third};10:00:00;0;1\n"
+        )
+    };
+    let of_days = vec![from_first[0].clone(), "r.csv: the days of the times are in column `Date`".to_owned()];
+    for (first, second, third) in [
+        ("2026-01-31", "2026-01-31", "2026-02-03"),
+        ("31.01.2026", "", "3.2.2026"),
+        ("2026-01-31 00:00:00", "2026-01-31 00:00:00", "2026-02-03 00:00:00"),
+    ] {
+        assert_eq!(times(&dates(first, second, third)), (vec![0.0, 1.0, 259_200.0], "s".to_owned(), of_days.clone()));
+    }
+    let slashes = read(dates("1/31/2026", "1/31/2026", "2/3/2026"), &Format::default()).unwrap_err();
+    assert!(slashes.contains("line 4, column Date: `2/3/2026` is not a date such as 2026-01-31 or 31.01"), "{slashes}");
+    let stays = "Date;Time;u_V;x_mm\n1/31/2026;23:59:59;0;1\n1/31/2026;0:00:01;0;1\n";
+    assert_eq!(times(stays).0, [0.0, 2.0]);
+    let stopwatch = "Date;Time;u_V;x_mm\n2026-01-31;0:00:01;0;1\n2026-02-01;0:00:02;0;1\n";
+    let error = read(stopwatch, &Format::default()).unwrap_err();
+    assert!(error.contains("line 3, column Time: `0:00:02` follows a smaller time while the date changes"), "{error}");
     // The difference is a nanosecond; doubles of this size are 256 apart.
     let epoch = "t_ns,u_V,x_mm\n1767225600123456789,0,1\n1767225600123456790,0,1\n";
     assert_eq!(times(epoch), (vec![0.0, 1e-9], "ns".to_owned(), from_first));

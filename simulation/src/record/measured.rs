@@ -147,7 +147,7 @@ impl Format {
         let mut rows =
             Rows { table: &mut table, columns: &columns, units: &units, clock: Clock::default(), sort: self.sort };
         let mut timed = rows.read()?;
-        let has_stamps = rows.clock.has_stamps();
+        let (has_stamps, dates) = (rows.clock.has_stamps(), rows.clock.dates());
         let mut remarks: Vec<String> = table.remarks().collect();
         if below_header.iter().any(Option::is_some) {
             let shown = below_header.each_ref().map(|unit| unit.as_deref().unwrap_or("-"));
@@ -185,6 +185,9 @@ impl Format {
         let from_first = has_stamps || are_closer_than_digits(&timed);
         if from_first {
             remarks.push(format!("{name}: times are counted from the first row"));
+        }
+        if let Some(dates) = dates {
+            remarks.push(format!("{name}: the days of the times are in column `{}`", excerpt(table.column(dates))));
         }
         // Sorted, the earliest row is the first one.
         let first = timed.first().map_or(0.0, |(time, _)| time.since_first);

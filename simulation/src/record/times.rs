@@ -1,6 +1,6 @@
 //! Times of a record: numbers in a unit, time stamps, or times of day.
 
-use chrono::{DateTime, NaiveDateTime, NaiveTime, Timelike};
+use chrono::{DateTime, NaiveDate, NaiveDateTime, NaiveTime, Timelike};
 
 use anyhow::Result;
 
@@ -10,6 +10,9 @@ use crate::csv_table::Row;
 
 /// Nanoseconds in a day.
 const DAY_NS: i128 = 86_400_000_000_000;
+
+/// A time below this, in ns, may be the first one of a stopwatch.
+const MINUTE_NS: i128 = 60_000_000_000;
 
 /// A time as read from a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +39,16 @@ pub(super) struct Clock {
     last: i128,
     /// True once a time has 24 h or more: those of a stopwatch, which do not begin again after midnight.
     is_stopwatch: bool,
+    dates: Dates,
+}
+
+/// The columns of dates beside times of day.
+#[derive(Debug, Default)]
+struct Dates {
+    /// Index and first date of each.
+    columns: Vec<(usize, String)>,
+    /// The first one whose date has changed: its dates are the days of the times.
+    changed: Option<usize>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +63,11 @@ impl Clock {
         matches!(self.first, Some(First::Stamp(_)))
     }
 
+    /// Index of the column whose dates are the days of the times.
+    pub(super) fn dates(&self) -> Option<usize> {
+        self.dates.changed.map(|place| self.dates.columns[place].0)
+    }
+
     /// The next time of the column.
     ///
     /// # Errors
@@ -57,6 +75,9 @@ impl Clock {
     pub(super) fn read(&mut self, row: &Row<'_>, column: usize) -> Result<Time> {
         let text = row.text(column);
         let stamp = Stamp::parse(text);
+        if self.first.is_none() && stamp.is_some_and(|stamp| stamp.form == Form::TimeOfDay) {
+            self.dates = Dates::of(row, column);
+        }
         let first = *self.first.get_or_insert(match stamp {
             Some(stamp) => First::Stamp(stamp),
             None if is_date(text) => bad_input!(
@@ -75,7 +96,17 @@ impl Clock {
             (First::Stamp(first), Some(mut stamp)) if first.form == stamp.form => {
                 if stamp.form == Form::TimeOfDay {
                     self.is_stopwatch |= stamp.nanoseconds >= DAY_NS;
-                    if !self.is_stopwatch {
+                    let had_changed = self.dates.changed.is_some();
+                    if let Some(days) = self.dates.days(row)? {
+                        if !had_changed && first.nanoseconds < MINUTE_NS && stamp.nanoseconds > self.last {
+                            bad_input!(
+                                "{}: `{text}` follows a smaller time while the date changes, as a stopwatch does; expected times of day, or \
+                                 time stamps such as 2026-01-31T23:59:58.5",
+                                row.place(column)
+                            );
+                        }
+                        stamp.nanoseconds += days * DAY_NS;
+                    } else if !self.is_stopwatch {
                         // After midnight a clock begins again: a time that is earlier by 12 h or more is one of the next day.
                         stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
                     }
@@ -94,6 +125,33 @@ impl Clock {
                 let value = row.number(column)?;
                 let exactly = exact.zip(Exact::parse(text)).map(|(first, time)| time.since(first));
                 Ok(Time { value, since_first: exactly.unwrap_or(value - first) })
+            }
+        }
+    }
+}
+
+impl Dates {
+    /// The columns of a record's first row that hold dates, without the column of times.
+    fn of(row: &Row<'_>, time: usize) -> Self {
+        let is_like =
+            |text: &str| date(text).is_some() || text.split('/').filter(|part| is_digits(part, 1, 4)).count() == 3;
+        let cells = row.cells().enumerate().filter(|(index, text)| *index != time && is_like(text));
+        Self { columns: cells.map(|(index, text)| (index, text.to_owned())).collect(), changed: None }
+    }
+
+    /// Days from the first date to that of a row; `None` as long as no date has changed. Where a sheet has merged cells, a date
+    /// is in the first of them only.
+    ///
+    /// # Errors
+    /// [`crate::bad_input::BadInput`] with file, line and column of another form of date.
+    fn days(&mut self, row: &Row<'_>) -> Result<Option<i128>> {
+        let has_changed = |(index, first): &(usize, String)| !row.text(*index).is_empty() && row.text(*index) != first;
+        self.changed = self.changed.or_else(|| self.columns.iter().position(has_changed));
+        let Some((index, first)) = self.changed.map(|place| &self.columns[place]) else { return Ok(None) };
+        match date(first).zip(date(row.text(*index))) {
+            Some((first, date)) => Ok(Some(date.signed_duration_since(first).num_days().into())),
+            None => {
+                Err(row.is_not(*index, "a date such as 2026-01-31 or 31.01.2026; expected one with every time of day"))
             }
         }
     }
@@ -192,6 +250,14 @@ fn is_date(text: &str) -> bool {
         parts.len() == 3 && parts.iter().zip(digits).all(|(part, (fewest, most))| is_digits(part, fewest, most))
     };
     has_parts('-', [(4, 4), (2, 2), (2, 2)]) || has_parts('.', [(1, 2), (1, 2), (4, 4)])
+}
+
+/// The date in a cell that holds nothing else, or midnight with it.
+fn date(text: &str) -> Option<NaiveDate> {
+    let (date, rest) = text.split_once(['T', ' ']).unwrap_or((text, ""));
+    let is_midnight = rest.chars().all(|letter| "0:.".contains(letter));
+    let forms = ["%Y-%m-%d", "%d.%m.%Y"].into_iter().filter(|_| is_midnight && is_date(date));
+    forms.filter_map(|form| NaiveDate::parse_from_str(date, form).ok()).next()
 }
 
 fn is_digits(text: &str, fewest: usize, most: usize) -> bool {
