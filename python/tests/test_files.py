@@ -20,8 +20,13 @@ def test_a_parquet_file_of_polars_is_the_record_that_its_csv_is(command, sample,
     )
     stamped.drop("time_s").write_parquet(file, compression="snappy")
     found = json.loads(command("identify", file, "--json"))
-    tau_s = [answer["nominal"]["tau_s"][0]["value"] for answer in (found, expected)]
-    assert tau_s[0] == pytest.approx(tau_s[1], rel=1e-6)
+    tau_s = lambda answer: answer["nominal"]["tau_s"][0]["value"]
+    assert tau_s(found) == pytest.approx(tau_s(expected), rel=1e-6)
+    for unit in ("ms", "us", "ns"):
+        elapsed = stamped.with_columns(time=(polars.col("time") - polars.datetime(2026, 1, 31)).cast(polars.Duration(unit)))
+        elapsed.drop("time_s").write_parquet(file, compression="snappy")
+        found = json.loads(command("identify", file, "--json"))
+        assert tau_s(found) == pytest.approx(tau_s(expected), rel=1e-6)
 
 
 def test_polars_reads_what_the_command_writes(command, tmp_path):

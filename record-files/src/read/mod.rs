@@ -1,5 +1,6 @@
 //! The columns of a file. Those that the record needs are read, of the others only the names.
 
+mod arrow;
 mod caught;
 pub(crate) mod mcap;
 mod messages;

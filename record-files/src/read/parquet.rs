@@ -1,7 +1,7 @@
 //! A Parquet file: its columns of numbers, time stamps and texts; lists are left out.
 //!
 //! Units are in the file's metadata, as `{"units": {"x": "mm"}}` under the key `PANDAS_ATTRS`, which pandas makes of
-//! `frame.attrs`, or as `{"x": "mm"}` under the key `units`; or they are in the names, as in CSV.
+//! `frame.attrs`, or as `{"x": "mm"}` under the key `units`; or they are in the names, as in CSV. Durations are read in s.
 
 use anyhow::Result;
 use bytes::Bytes;
@@ -19,7 +19,7 @@ use simulation::record::columns::{Column, too_many_rows};
 use simulation::record::{Format, with_unit};
 
 use super::caught::caught;
-use super::{Cells, Columns, pages};
+use super::{Cells, Columns, arrow, pages};
 
 /// Number of cells that are read at a time.
 const BATCH: usize = 1 << 12;
@@ -37,14 +37,17 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     if metadata.num_rows() > MOST_ROWS as i64 {
         return Err(too_many_rows(name).into());
     }
-    let units = units(metadata.key_value_metadata().into_iter().flatten());
+    let pairs = || metadata.key_value_metadata().into_iter().flatten();
+    let of_arrow = pairs().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
+    let durations = of_arrow.map(arrow::durations).unwrap_or_default();
+    let units = units(pairs());
     let schema = metadata.schema_descr();
     let flat = (0..schema.num_columns()).filter(|index| schema.column(*index).max_rep_level() == 0);
     let flat: Vec<usize> = flat.collect();
     let named = |index: &usize| {
         let column = schema.column(*index).path().string();
         let unit = units.get(&column).and_then(Value::as_str).unwrap_or_default();
-        with_unit(&column, unit)
+        with_unit(&column, if durations.contains_key(&column) { "s" } else { unit })
     };
     let names: Vec<String> = flat.iter().map(named).collect();
     let needed = format.indices(name, names.iter().map(String::as_str))?;
@@ -52,7 +55,8 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     for (place, column) in names.into_iter().enumerate() {
         let cells = if needed.contains(&place) {
             let wrong = |what: String| BadInput(format!("{name}, column {column}: {what}"));
-            cells(&reader, &bytes, flat[place]).map_err(wrong)?
+            let per_second = durations.get(&schema.column(flat[place]).path().string()).copied();
+            cells(&reader, &bytes, flat[place], per_second).map_err(wrong)?
         } else {
             Column::Unread
         };
@@ -86,6 +90,8 @@ enum Whole {
     Number { places: i32, is_signed: bool },
     /// A time since 1970, in parts of a second.
     Stamp { per_second: i64, is_utc: bool },
+    /// A duration in parts of a second, which becomes one in s.
+    Duration { per_second: i64 },
 }
 
 impl Whole {
@@ -118,6 +124,7 @@ impl Whole {
             Self::Number { places: 0, is_signed: false } => cells.whole(unsigned.into()),
             Self::Number { places, .. } => cells.number(value as f64 / 10f64.powi(places)),
             Self::Stamp { per_second, is_utc } => cells.text(stamp(value, per_second, is_utc)),
+            Self::Duration { per_second } => cells.number(value as f64 / per_second as f64),
         }
     }
 }
@@ -130,12 +137,18 @@ fn stamp(value: i64, per_second: i64, is_utc: bool) -> String {
     if is_utc { text } else { text.trim_end_matches('Z').to_owned() }
 }
 
-/// The cells of a column, or what is wrong with it.
-fn cells(file: &SerializedFileReader<Bytes>, bytes: &[u8], index: usize) -> Result<Column, String> {
+/// The cells of a column, or what is wrong with it; `per_second` is given for one of durations.
+fn cells(
+    file: &SerializedFileReader<Bytes>,
+    bytes: &[u8],
+    index: usize,
+    per_second: Option<i64>,
+) -> Result<Column, String> {
     let descriptor = file.metadata().file_metadata().schema_descr().column(index);
     let most = descriptor.max_def_level();
     let mut cells = Cells::new();
-    let whole = || Whole::of(&descriptor).ok_or_else(|| unsupported(&descriptor));
+    let duration = per_second.map(|per_second| Whole::Duration { per_second });
+    let whole = || duration.or_else(|| Whole::of(&descriptor)).ok_or_else(|| unsupported(&descriptor));
     for group in 0..file.num_row_groups() {
         check_pages(file, bytes, group, index)?;
         let reader = file.get_row_group(group).and_then(|group| group.get_column_reader(index));
