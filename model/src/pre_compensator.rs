@@ -29,7 +29,7 @@
 
 use crate::coefficient::{Gain, Rate, upper, widened};
 use crate::error::OutOfRange;
-use crate::estimator::{OperatingPoint, StepGain};
+use crate::estimator::{Model, OperatingPoint, StepGain};
 use crate::units::{Accumulator, SampleTime, Signal, Volts, rarely, signal};
 use crate::validated::Validated;
 
@@ -49,6 +49,33 @@ pub struct Gains {
 impl Gains {
     /// The gains that reproduce the source report's column "with controller"; the report does not print them.
     pub const PAPER: Self = Self { proportional: 4.0, integral_per_s: 1.35 };
+
+    /// The gains of [`Gains::PAPER`], lowered as far as a quick spring demands.
+    pub fn lowered_for(spring: &impl Model, sample_time: SampleTime) -> Self {
+        let most = Self::most_proportional(&spring.largest_step_gain(sample_time));
+        Self::with_proportional(Self::PAPER.proportional.min(most), sample_time)
+    }
+
+    /// A proportional gain with the integral gain of [`Gains::PAPER`], lowered as far as the sample time demands.
+    pub fn with_proportional(proportional: f64, sample_time: SampleTime) -> Self {
+        let integral_per_s = Self::PAPER.integral_per_s.min(Self::most_integral_per_s(proportional, sample_time));
+        Self { proportional, integral_per_s }
+    }
+
+    /// The dead-beat gain of a spring of this largest step gain, at most 100 V/V.
+    fn most_proportional(spring: &StepGain) -> f64 {
+        // One tick moves the relaxed part by `relaxation + in_one_tick Kp g` of its distance; more than all of it
+        // rings.
+        let StepGain { feedthrough, in_one_tick, relaxation } = *spring;
+        let ringing = in_one_tick - (1.0 - relaxation) * feedthrough;
+        let dead_beat = if ringing > 0.0 { (1.0 - relaxation) / ringing } else { f64::INFINITY };
+        dead_beat.min(100.0)
+    }
+
+    /// With a reset time of a few ticks the loop would hunt over DAC codes.
+    fn most_integral_per_s(proportional: f64, sample_time: SampleTime) -> f64 {
+        proportional / (10.0 * sample_time.seconds())
+    }
 }
 
 /// The pre-compensator for one plant and sample time, quantized for the tick.
@@ -78,14 +105,9 @@ impl Gains {
     /// # Errors
     /// [`OutOfRange`] names `proportional_gain` or `integral_gain_per_s`.
     pub(crate) fn check(&self, spring: &StepGain, sample_time: SampleTime) -> Result<(), OutOfRange> {
-        // One tick moves the relaxed part by `relaxation + in_one_tick Kp g` of its distance; more than all of it
-        // rings.
-        let StepGain { feedthrough, in_one_tick, relaxation } = *spring;
-        let ringing = in_one_tick - (1.0 - relaxation) * feedthrough;
-        let dead_beat = if ringing > 0.0 { (1.0 - relaxation) / ringing } else { f64::INFINITY };
-        OutOfRange::check("proportional_gain", self.proportional, 0.001..=dead_beat.min(100.0), "V/V")?;
-        // With a reset time of a few ticks the loop would hunt over DAC codes.
-        let fastest = self.proportional / (10.0 * sample_time.seconds());
+        let most = Self::most_proportional(spring);
+        OutOfRange::check("proportional_gain", self.proportional, 0.001..=most, "V/V")?;
+        let fastest = Self::most_integral_per_s(self.proportional, sample_time);
         OutOfRange::check("integral_gain_per_s", self.integral_per_s, 0.0..=fastest, "1/s")
     }
 }

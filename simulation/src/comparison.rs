@@ -5,6 +5,7 @@ use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, M
 use serde::Serialize;
 
 use crate::bad_input::BadInput;
+use crate::control_loop::{Controller, gains};
 use crate::experiment::{Experiment, HasReference, Run, StartsFrom, with_plant};
 use crate::plant_file::PlantFile;
 use crate::response::{Response, from_present, measure, responses};
@@ -49,7 +50,7 @@ pub struct AtLimit {
 pub struct Step {
     /// Response without a controller, where the target is the voltage.
     pub none: Response,
-    /// Response with the report's proportional-integral controller.
+    /// Response with the report's proportional-integral controller, whose gains are lowered as far as a quick spring demands.
     pub paper: Response,
     /// Response with the time-optimal controller.
     pub fast: Response,
@@ -89,13 +90,14 @@ pub fn compare(
         amplifier: file.behind(amplifier),
         feedback: None,
     };
+    let gains = gains([None; 2], Controller::Paper, file, rate_hz)?;
     let limits = amplifiers.iter().map(|&amplifier| {
         let settings = settings(amplifier);
         // As in `vsj stair`: where the range ends below the limit, only the sampled reference accepts targets at its
         // end.
         let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
-            Some(plant) => steps(with_plant(&settings, plant), on, margin)?,
-            None => steps(settings, on, margin)?,
+            Some(plant) => steps(with_plant(&settings, plant), gains, on, margin)?,
+            None => steps(settings, gains, on, margin)?,
         };
         Ok(AtLimit { limit_v: settings.amplifier.max_v, steps })
     });
@@ -107,7 +109,12 @@ pub fn compare(
 /// A spring that differs from the model, and the noise of its sensor in V, if it has one.
 type On<'a> = (&'a DifferingSpring, Option<f64>);
 
-fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>, margin: Option<Margin>) -> Result<Vec<Step>> {
+fn steps<P: HasReference>(
+    settings: Settings<P>,
+    gains: Gains,
+    on: Option<On>,
+    margin: Option<Margin>,
+) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
         let experiment =
@@ -126,7 +133,7 @@ fn steps<P: HasReference>(settings: Settings<P>, on: Option<On>, margin: Option<
             }
         })
     };
-    let (paper, none) = of(Compensation::ProportionalIntegral(Gains::PAPER))?;
+    let (paper, none) = of(Compensation::ProportionalIntegral(gains))?;
     let (fast, _) = of(Compensation::TimeOptimal(Approach::DEAD_BEAT))?;
     let mut robust = match margin {
         Some(margin) => of(Compensation::Robust(margin))?.0,

@@ -146,6 +146,31 @@ impl Options {
     }
 }
 
+/// The gains `[kp, ki]` of a controller: those that are given, else the report's, lowered as far as a quick spring demands.
+///
+/// # Errors
+/// [`BadInput`] for gains that would be ignored, and for a rate that the tick rejects.
+pub fn gains(given: [Option<f64>; 2], controller: Controller, plant: &PlantFile, rate_hz: f64) -> Result<Gains> {
+    if controller != Controller::Paper {
+        if given != [None; 2] {
+            bad_input!("--kp and --ki apply to the paper controller only: expected --controller paper");
+        }
+        return Ok(Gains::PAPER);
+    }
+    let [kp, ki] = given;
+    let sample_time = SampleTime::from_rate(rate_hz).map_err(refused)?;
+    let spring = plant.extended();
+    // A spring that the tick rejects is named by the check of the loop.
+    let is_accepted = spring.validate(sample_time).is_ok();
+    let lowered = if is_accepted { Gains::lowered_for(&spring, sample_time) } else { Gains::PAPER };
+    let gains = match kp {
+        Some(kp) if kp > 0.0 => Gains::with_proportional(kp, sample_time),
+        Some(kp) => Gains { proportional: kp, ..lowered },
+        None => lowered,
+    };
+    Ok(Gains { integral_per_s: ki.unwrap_or(gains.integral_per_s), ..gains })
+}
+
 /// A margin in a file.
 mod margin {
     use model::Margin;

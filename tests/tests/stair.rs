@@ -301,3 +301,22 @@ fn another_spring_is_not_compared_with_the_reports_values() {
         answer["rows"].as_array().unwrap().iter().all(|row| row["printed_with"].is_null() && row["measured"].is_null())
     );
 }
+
+/// The report's gains would ring on a quick spring: the default is lowered, what a user asks for is refused.
+#[test]
+fn the_default_gains_suit_a_quick_spring() {
+    let folder = tempdir().unwrap();
+    let plant = "schema = 1\n[reading]\ngain = 1\nzero = 0\n[relaxation]\nshare = 0.1\ntau_s = 0.002\n";
+    fs::write(folder.path().join("quick.toml"), plant).unwrap();
+    fs::write(folder.path().join("step.csv"), "time_s,voltage_v\n0,0\n1,100\n3,100\n").unwrap();
+    for command in [&["stair", "--input", "step.csv"][..], &["compare", "--limit-v", "700"]] {
+        let output = run(folder.path(), &[command, &["--plant", "quick.toml"]].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let remark = "vsj: --kp 2.0668: the largest for this spring at this rate, instead of 4";
+        assert_eq!(text(&output.stderr).lines().next(), Some(remark), "{command:?}");
+    }
+    let asked = run(folder.path(), &["stair", "--plant", "quick.toml", "--kp", "4"]);
+    assert!(text(&asked.stderr).contains("--kp: proportional_gain = 4 is not allowed: expected 0.001 to 2.066"));
+    let low = run(folder.path(), &["stair", "--input", "step.csv", "--kp", "0.005"]);
+    assert_eq!(text(&low.stderr).trim(), "vsj: --ki 0.5000: the largest for this spring at this rate, instead of 1.35");
+}

@@ -7,8 +7,10 @@ use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::comparison::{Actual, compare};
+use simulation::control_loop::{Controller, gains};
 use simulation::option_names::{SETTINGS, named};
 
+use super::loop_arguments::remark_on_gains;
 use super::plant;
 use super::spring_error::{ErrorOf, Known, together};
 
@@ -84,6 +86,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let actual = arguments.actual()?;
     let margin = arguments.known.margin()?;
+    let gains = gains([None; 2], Controller::Paper, &file, arguments.rate_hz)?;
+    remark_on_gains(&gains, [None; 2]);
     let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)
         .map_err(|error| named(error, SETTINGS))?;
     print(&if arguments.json { json(&comparison)? } else { text(&comparison) })

@@ -3,8 +3,10 @@
 use anyhow::Result;
 use clap::Args;
 use model::Gains;
-use simulation::bad_input;
-use simulation::control_loop::{Controller, Options};
+use simulation::control_loop::{Controller, Options, gains};
+use simulation::plant_file::PlantFile;
+
+use host_sim::output::terminal::remark;
 
 use super::choice::{CONTROLLER, one_of};
 use super::spring_error::Known;
@@ -31,10 +33,10 @@ pub(crate) struct LoopArguments {
     /// Width of the DAC, in bits
     #[arg(long, default_value_t = 12, value_name = "BITS")]
     dac_bits: u32,
-    /// Proportional gain of the paper controller; default: 4
+    /// Proportional gain of the paper controller; default: 4, less for a quick spring
     #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
     kp: Option<f64>,
-    /// Integral gain of the paper controller, in 1/s; default: 1.35
+    /// Integral gain of the paper controller, in 1/s; default: 1.35, less for a quick spring
     #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
     ki: Option<f64>,
     /// Time constant of the fast controller's approach to the target, in s, 0 to 1; default: 0
@@ -48,18 +50,17 @@ pub(crate) struct LoopArguments {
 }
 
 impl LoopArguments {
-    /// The settings of the loop.
+    /// The settings of the loop around a spring; remarks on gains that are not the report's because the spring does not allow them.
     ///
     /// # Errors
-    /// [`simulation::BadInput`] for options that would be ignored.
-    pub(crate) fn options(&self) -> Result<Options> {
+    /// [`simulation::BadInput`] for options that would be ignored, and for a spring that the tick rejects.
+    pub(crate) fn options(&self, plant: &PlantFile) -> Result<Options> {
         let Self { limit_v, min_v, slew_v_per_s, dac_bits, kp, ki, approach_s, rate_hz, .. } = *self;
         let margin = self.known.margin()?;
         let default = if margin.is_some() { Controller::Robust } else { Controller::Paper };
         let controller = self.controller.unwrap_or(default);
-        if (kp.is_some() || ki.is_some()) && controller != Controller::Paper {
-            bad_input!("--kp and --ki apply to the paper controller only: expected --controller paper");
-        }
+        let gains = gains([kp, ki], controller, plant, rate_hz)?;
+        remark_on_gains(&gains, [kp, ki]);
         let feedback = None;
         let options = Options {
             controller,
@@ -67,8 +68,8 @@ impl LoopArguments {
             min_v,
             slew_v_per_s,
             dac_bits,
-            kp: kp.unwrap_or(Gains::PAPER.proportional),
-            ki: ki.unwrap_or(Gains::PAPER.integral_per_s),
+            kp: gains.proportional,
+            ki: gains.integral_per_s,
             approach_s,
             margin,
             rate_hz,
@@ -76,5 +77,18 @@ impl LoopArguments {
         };
         options.check()?;
         Ok(options)
+    }
+}
+
+/// Remarks on gains that are smaller than the report's although no option says so.
+pub(crate) fn remark_on_gains(gains: &Gains, [kp, ki]: [Option<f64>; 2]) {
+    let Gains { proportional, integral_per_s } = *gains;
+    let usual = Gains::PAPER;
+    for (option, given, value, usual) in
+        [("--kp", kp, proportional, usual.proportional), ("--ki", ki, integral_per_s, usual.integral_per_s)]
+    {
+        if given.is_none() && value < usual {
+            remark(&format!("{option} {value:.4}: the largest for this spring at this rate, instead of {usual}"));
+        }
     }
 }

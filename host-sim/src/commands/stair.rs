@@ -118,8 +118,8 @@ impl Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     arguments.check()?;
-    let options = arguments.control.options()?;
     let file = plant::load(&arguments.control.plant)?;
+    let options = arguments.control.options(&file)?;
     let stride = arguments.stride(options.rate_hz)?;
     let record = match arguments.input.as_str() {
         "stair" | "step" => None,

@@ -57,3 +57,18 @@ fn the_reset_time_is_at_least_ten_sample_times() {
     assert_eq!(error(400.0), Ok(()));
     assert_eq!(error(400.1).unwrap_err().field, "integral_gain_per_s");
 }
+
+#[test]
+fn lowered_gains_are_accepted_for_every_spring() {
+    for (rate_hz, share, time_constant_s) in
+        [(1000.0, 0.1, 0.002), (1000.0, 0.0, 0.002), (100.0, 0.9, 0.02), (10_000.0, 1.0 / 11.0, 5.5), (100.0, 0.0, 0.5)]
+    {
+        let time = SampleTime::from_rate(rate_hz).unwrap();
+        let plant = Plant { share, time_constant_s };
+        let gains = Gains::lowered_for(&plant, time);
+        let is_usual = Gains::PAPER.check(&plant.largest_step_gain(time), time).is_ok();
+        assert_eq!((gains.check(&plant.largest_step_gain(time), time), gains == Gains::PAPER), (Ok(()), is_usual));
+    }
+    let time = SampleTime::from_rate(1000.0).unwrap();
+    assert_eq!(Gains::with_proportional(0.001, time), Gains { proportional: 0.001, integral_per_s: 0.1 });
+}

@@ -8,12 +8,13 @@
 //! t97 and overshoot are those of the worst step of the ideal stair. There is no sensor, so that the voltages are those of the nominal run.
 
 use anyhow::Result;
-use model::{Compensation, Gains, Margin};
+use model::{Compensation, Margin};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
+use crate::control_loop::{Controller, gains};
 use crate::robust_bound::{Allowed, Needed, RobustBound};
 use crate::spring_error::{DifferingSpring, Parameter, SpringError};
 use crate::tune::Specification;
@@ -81,8 +82,9 @@ pub(super) fn evaluate(
     ends.iter().try_for_each(|error| DifferingSpring::new(file, error).check())?;
     let drawn = drawn(&spring_error);
     let margin = Margin { time_constant, share, gain, overshoot };
+    let gains = gains([None; 2], Controller::Paper, file, specification.rate_hz)?;
     let compensations = [
-        ("paper", Compensation::ProportionalIntegral(Gains::PAPER)),
+        ("paper", Compensation::ProportionalIntegral(gains)),
         ("fast", fast),
         ("robust", Compensation::Robust(margin)),
     ];

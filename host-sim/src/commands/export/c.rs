@@ -38,8 +38,9 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let (name, options) = (&arguments.control.plant, arguments.control.options()?);
+    let name = &arguments.control.plant;
     let plant = plant::load(name)?;
+    let options = arguments.control.options(&plant)?;
     let not_simulated = plant.left_out();
     ControlLoop::new(&plant, &options)?;
     let mut files = Files::new(&arguments.out)?;

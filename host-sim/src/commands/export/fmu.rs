@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let (plant, plant_text) = plant_file::load_with_text(&arguments.control.plant)?;
     remark_on(&arguments.control.plant, &plant);
     let not_simulated = plant.left_out();
-    let unit = Unit { kind: Kind::Both, plant, options: arguments.control.options()? };
+    let options = arguments.control.options(&plant)?;
+    let unit = Unit { kind: Kind::Both, plant, options };
     unit.check()?;
     let libraries = libraries(&arguments.library)?;
     let all = Kind::ALL.into_iter().flat_map(|kind| Version::ALL.map(|version| (kind, version)));
