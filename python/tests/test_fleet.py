@@ -577,6 +577,18 @@ def test_a_name_with_several_folders_is_a_spring(tmp_path):
     ]
 
 
+def test_files_that_are_no_records_are_counted(tmp_path):
+    for name in ("a.CSV", "b.csv", ".hidden.csv", ".git/c.csv", "~$b.csv", "note.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "b.csv")
+    remarks = []
+    _, table = records.listed(tmp_path, remark=remarks.append)
+    assert table["record"].to_pylist() == ["a.CSV", "b.csv", "link.csv"]
+    assert remarks == ["2 of 5 files are no records: expected *.csv or *.parquet"]
+
+
 def test_an_unchanged_parameter_signals_as_rarely_as_stated():
     random, compared, signals = np.random.default_rng(1), 0, 0
     for _ in range(500):

@@ -63,7 +63,7 @@ def _expect_no_ignored(parser, wanted):
 
 def _diagnose(wanted):
     out = records.absolute(wanted.out)
-    folder, table = records.listed(wanted.records, store.addresses(out))
+    folder, table = records.listed(wanted.records, store.addresses(out), lambda text: _said(f"{wanted.records}: {text}", 0))
     settings, plants = _settings(wanted, table, folder)
     table = _with_plants(table, wanted.plant)
     store.expect_writable(out)

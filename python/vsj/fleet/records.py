@@ -26,7 +26,7 @@ SCHEMA = pa.schema(
 """Columns of a table of records; ``record`` is relative to the folder. ``time`` and ``plant`` may be null."""
 
 ENDINGS = (".csv", ".parquet")
-"""Endings of the files that are records."""
+"""Endings of the files that are records, in lower or upper case."""
 
 _DATE = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)(?:[T_ ](\d\d)[-:]?(\d\d)(?:[-:]?(\d\d)(?:\.(\d{1,6}))?)?)?(Z|[+-]\d\d:?\d\d)?(?!\d)"
@@ -58,16 +58,22 @@ def readable(name, expected):
         raise BadInput(f"{name}: cannot be read as {expected}: {str(error).splitlines()[0]}") from error
 
 
-def listed(url, results=()):
+def is_parquet(path):
+    """True for the name of a Parquet file."""
+    return str(path).lower().endswith(".parquet")
+
+
+def listed(url, results=(), remark=lambda text: None):
     """The records in a folder or a manifest, and the address of the folder that their names are relative to.
 
-    Files of the folder whose addresses begin with one of ``results`` are no records. Raises BadInput if there is none, or the manifest's columns are not as expected.
+    Files of the folder whose addresses begin with one of ``results`` are no records. ``remark`` is called with what the user should
+    know about the others. Raises BadInput if there is none, or the manifest's columns are not as expected.
     """
     fs, path = filesystem(url)
     if fs.isfile(path):
         folder, table = posixpath.dirname(path), _manifest(fs, path, url)
     elif fs.isdir(path):
-        folder, table = path, _folder(fs, path, results)
+        folder, table = path, _folder(fs, path, results, remark)
     else:
         raise BadInput(f"{url}: not found; expected a folder of records, or a manifest")
     if table.num_rows == 0:
@@ -102,11 +108,22 @@ def time_of(text):
         return None
 
 
-def _folder(fs, path, results):
-    """Records at ``SPRING/DATE.csv``; a spring's name may have several parts, and a record in no folder is its own spring."""
-    names = sorted(
-        name for name in fs.find(path) if name.endswith(ENDINGS) and not fs.unstrip_protocol(name).startswith(tuple(results))
-    )
+def _folder(fs, path, results, remark):
+    """Records at ``SPRING/DATE.csv``; a spring's name may have several parts, and a record in no folder is its own spring.
+
+    Hidden files, and the locks of office programs, are not looked at.
+    """
+    parts = lambda name: posixpath.relpath(name, path).split("/")
+    seen = {
+        name: info
+        for name, info in sorted(fs.find(path, detail=True).items())
+        if not fs.unstrip_protocol(name).startswith(tuple(results)) and not any(it.startswith((".", "~$")) for it in parts(name))
+    }
+    # A pipe would be waited for; a link may lead to a file.
+    is_file = lambda name: seen[name]["type"] == "file" or fs.isfile(name)
+    names = [name for name in seen if name.lower().endswith(ENDINGS) and is_file(name)]
+    if names and len(names) < len(seen):
+        remark(f"{len(seen) - len(names)} of {len(seen)} files are no records: expected {' or '.join('*' + it for it in ENDINGS)}")
     relative = [posixpath.relpath(name, path) for name in names]
     stems = [posixpath.splitext(posixpath.basename(name))[0] for name in relative]
     springs = [posixpath.dirname(name) or stem for name, stem in zip(relative, stems)]
@@ -117,7 +134,7 @@ def _folder(fs, path, results):
 def _manifest(fs, path, url):
     """The records that a CSV or Parquet file lists: ``record``, and optionally ``spring``, ``time`` and ``plant``."""
     with readable(url, "a manifest"), fs.open(path, "rb") as file:
-        if path.endswith(".parquet"):
+        if is_parquet(path):
             table = parquet.read_table(file)
         else:
             texts = csv.ConvertOptions(
