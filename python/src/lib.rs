@@ -35,6 +35,8 @@ mod _vsj {
     use crate::error::{BadInput, LinkError};
     #[pymodule_export]
     use crate::link::Port;
+    #[pymodule_export]
+    use crate::records::with_unit;
 
     /// The style sheet of the command's report pages.
     #[pymodule_export]

@@ -42,6 +42,12 @@ pub(crate) struct Records {
     pub(crate) remarks: Vec<String>,
 }
 
+/// The name of a column that says its unit, as the command makes it of the units in a file.
+#[pyfunction]
+pub(crate) fn with_unit(name: &str, unit: &str) -> String {
+    simulation::record::with_unit(name, unit)
+}
+
 /// Copies the columns of records, so that they can be read without the interpreter's lock.
 pub(crate) fn copied(records: Vec<Given<'_>>) -> Vec<Owned> {
     let copied = |columns: Vec<(String, Cells<'_>)>| {

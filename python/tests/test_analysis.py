@@ -9,7 +9,9 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pandas
 import polars
+import pyarrow.parquet
 import pytest
+from matplotlib import pyplot
 
 import vsj
 from conftest import SAMPLE
@@ -268,3 +270,48 @@ def test_figures_are_drawn(diagnosis):
         figure = answer.plot()
         assert figure.axes and figure.axes[0].lines
     assert set(found.to_frame()["quantity"]) >= {"gain", "zero", "share", "delay_s", "tau_s[0]", "weight[0]"}
+
+
+def test_units_of_a_frame_are_those_of_the_command(command, sample, tmp_path):
+    frame = pandas.DataFrame({"t": 1e3 * sample["time_s"], "u": 1e-3 * sample["voltage_v"], "x": sample["stiffness"]})
+    frame.attrs["units"] = {"t": "ms", "u": "kV", "x": "mm"}
+    file = tmp_path / "frame.parquet"
+    frame.to_parquet(file)
+    expected = json.loads(command("identify", file, "--json"))
+    for data in (frame, pyarrow.parquet.read_table(file), pandas.read_parquet(file)):
+        found = vsj.identify(data)
+        assert without_names(found.to_json()) == {**expected, "start": without_names(json.dumps(expected))["start"]}
+        assert found.unit == "mm"
+
+
+def test_durations_are_in_s_whatever_the_name_says(sample):
+    expected = vsj.identify((sample["time_s"], sample["voltage_v"], sample["stiffness"])).nominal.tau_s[0].value
+    frame = pandas.DataFrame({"t_ms": pandas.to_timedelta(sample["time_s"], unit="s"), "u_V": sample["voltage_v"], "x_mm": sample["stiffness"]})
+    assert vsj.identify(frame).nominal.tau_s[0].value == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_a_mask_hides_is_no_reading(sample):
+    time, voltage, reading = sample["time_s"], sample["voltage_v"], sample["stiffness"].copy()
+    hidden = np.zeros(len(time), bool)
+    hidden[100:110] = True
+    expected = vsj.identify((time, voltage, np.where(hidden, np.nan, reading)))
+    reading[hidden] = 1e6
+    of_columns = np.zeros((len(time), 3), bool)
+    of_columns[:, 2] = hidden
+    rows = np.ma.array(np.c_[time, voltage, reading], mask=of_columns)
+    for data in ((time, voltage, np.ma.array(reading, mask=hidden)), rows):
+        with pytest.warns(vsj.RecordWarning, match="10 of 2401 rows without a reading"):
+            assert vsj.identify(data).to_json() == expected.to_json()
+    for data in (
+        (np.ma.array(time, mask=hidden), voltage, reading),
+        (time, np.ma.array(voltage, mask=hidden), reading),
+        (time, np.ma.array(voltage.astype(int), mask=hidden), reading),
+        (np.ma.array(np.datetime64("2026-01-31", "ms") + (1000 * time).astype("m8[ms]"), mask=hidden), voltage, reading),
+    ):
+        with pytest.raises(vsj.BadInput, match="line 102"):
+            vsj.identify(data, time="time", voltage="voltage_v", reading="x")
+
+
+def test_a_lazy_frame_is_collected(sample):
+    frame = polars.DataFrame(sample)
+    assert vsj.identify(frame.lazy()).to_json() == vsj.identify(frame).to_json()

@@ -589,6 +589,19 @@ def test_files_that_are_no_records_are_counted(tmp_path):
     assert remarks == ["2 of 5 files are no records: expected *.csv or *.parquet"]
 
 
+def test_units_of_a_parquet_file_are_those_of_the_command(copied, tmp_path, engine):
+    [csv] = sorted(copied.glob("*/*.csv"))[:1]
+    frame = pandas.read_csv(csv).rename(columns={"time_s": "t", "voltage_v": "u", "stiffness": "x"})
+    frame = frame.assign(t=1e3 * frame["t"])
+    frame.attrs["units"] = {"t": "ms", "u": "V", "x": "V"}
+    (tmp_path / "one").mkdir()
+    frame.to_parquet(tmp_path / "one/2026-01-31.PARQUET")
+    out = tmp_path / "out"
+    assert fleet.main([str(tmp_path / "one"), "--out", str(out), "--scheduler", engine]) == 0
+    [row] = rows_of(out).values()
+    assert row["rmse"] == pytest.approx(vsj.diagnose(csv).baseline.rmse, rel=1e-9)
+
+
 def test_an_unchanged_parameter_signals_as_rarely_as_stated():
     random, compared, signals = np.random.default_rng(1), 0, 0
     for _ in range(500):

@@ -1,5 +1,6 @@
 """Records as users have them, as columns for the library."""
 
+import json
 import os
 import warnings
 from collections.abc import Mapping
@@ -34,44 +35,55 @@ def _record(data, name, options):
         path = os.fspath(data)
         other = _READ_BY.get(os.path.splitext(path)[1].lower())
         if other is not None:
-            raise _bad_input(f"{path}: the path of a record is that of a CSV file; expected {other}")
+            raise bad_input(f"{path}: the path of a record is that of a CSV file; expected {other}")
         return path, None
     if options.get("separator") is not None:
-        raise _bad_input("separator: applies to paths of CSV files only; expected none")
+        raise bad_input("separator: applies to paths of CSV files only; expected none")
+    if type(data).__name__ == "LazyFrame":
+        data = data.collect()
     if isinstance(data, Mapping):
-        return name.replace("DataFrame", "columns"), [(str(key), _cells(column)) for key, column in data.items()]
+        return name.replace("DataFrame", "columns"), [_column(str(key), column) for key, column in data.items()]
+    # A table of pyarrow has both names and columns, a frame names in `columns`.
+    if hasattr(data, "column_names") and hasattr(data, "schema"):
+        units = _units_of_metadata(data.schema.metadata or {})
+        return name.replace("DataFrame", "table"), [
+            _column(column, np.asarray(cells), units) for column, cells in zip(data.column_names, data.columns)
+        ]
     columns = getattr(data, "columns", None)
     if columns is not None:
-        return name, _index(data) + [(str(column), _cells(data[column])) for column in columns]
+        units = getattr(data, "attrs", {}).get("units")
+        return name, _index(data, units) + [_column(str(column), data[column], units) for column in columns]
     if isinstance(data, np.ndarray) and data.dtype.names:
-        return name.replace("DataFrame", "array"), [(column, _cells(data[column])) for column in data.dtype.names]
+        return name.replace("DataFrame", "array"), [_column(column, data[column]) for column in data.dtype.names]
     if isinstance(data, tuple):
         columns = data
     else:
-        array = np.asarray(data)
+        # `asarray` would show what a mask hides.
+        array = data if isinstance(data, np.ma.MaskedArray) else np.asarray(data)
         if array.ndim != 2 or array.shape[1] != 3:
-            raise _bad_input(
+            raise bad_input(
                 f"data: shape {array.shape}; expected a path, a frame, columns by name, three arrays, or an array of shape (n, 3)"
             )
-        columns = tuple(array.T)
+        columns = tuple(array[:, column] for column in range(3))
     if len(columns) != 3:
-        raise _bad_input(f"data: {len(columns)} arrays; expected three: time, voltage, reading")
+        raise bad_input(f"data: {len(columns)} arrays; expected three: time, voltage, reading")
     asked = (options["time"], options["voltage"], options["reading"] or options["column"])
     names = [_name(option, default) for option, default in zip(asked, CONTRACT)]
-    return name.replace("DataFrame", "arrays"), list(zip(names, map(_cells, columns)))
+    return name.replace("DataFrame", "arrays"), list(map(_column, names, columns))
 
 
-def _index(frame):
+def _index(frame, units):
     """The index of a pandas frame as a column, if it has a name, or times, which without a name are ``time``."""
     index = getattr(frame, "index", None)
     kind = getattr(getattr(index, "dtype", None), "kind", None)
     name = getattr(index, "name", None)
     if name is None and kind in ("M", "m"):
         name = "time"
-    return [] if name is None or name in frame.columns else [(str(name), _cells(index))]
+    return [] if name is None or name in frame.columns else [_column(str(name), index, units)]
 
 
-def _bad_input(text):
+def bad_input(text):
+    """The exception for invalid input."""
     from ._vsj import BadInput
 
     return BadInput(text)
@@ -82,13 +94,47 @@ def _name(option, default):
     return default if option is None else option.rpartition(":")[0] or option
 
 
-def _cells(column):
-    """A column as an array of doubles, or as a list of texts where doubles would lose something."""
+def _units_of_metadata(metadata):
+    """The units in the metadata of a Parquet file, by the keys that the command reads."""
+    units = {}
+    for key in (b"units", b"PANDAS_ATTRS"):
+        try:
+            found = json.loads(metadata.get(key, b"{}"))
+        except ValueError:
+            continue
+        found = found.get("units") if key == b"PANDAS_ATTRS" and isinstance(found, dict) else found
+        units.update(found if isinstance(found, dict) else {})
+    return units
+
+
+def _column(name, column, units=None):
+    """The name of a column with its unit, and its cells; ``units`` are those of ``frame.attrs["units"]``."""
+    from ._vsj import with_unit
+
     if hasattr(column, "to_numpy"):
         column = column.to_numpy()
-    array = np.asarray(column)
+    array = unmasked(column)
+    unit = units.get(name) if isinstance(units, Mapping) else None
+    if array.dtype.kind == "m":
+        unit = "s"
+    return with_unit(name, unit) if isinstance(unit, str) else name, _cells(array)
+
+
+def unmasked(values):
+    """``values`` as an array in which what a mask hides is missing."""
+    if not np.ma.is_masked(values):
+        return np.asarray(values)
+    kind = values.dtype.kind
+    if kind in "Mm":
+        return values.filled(np.array("NaT", values.dtype))
+    # Whole numbers may have more digits than a double.
+    return values.astype(np.float64).filled(np.nan) if kind in "bf" else values.astype(object).filled(None)
+
+
+def _cells(array):
+    """A column as an array of doubles, or as a list of texts where doubles would lose something."""
     if array.ndim != 1:
-        raise _bad_input(f"column: shape {array.shape}; expected one dimension")
+        raise bad_input(f"column: shape {array.shape}; expected one dimension")
     kind = array.dtype.kind
     if kind == "M":
         return np.datetime_as_string(array, unit="ns").tolist()

@@ -15,7 +15,7 @@ from pyarrow import parquet
 
 from .. import BadInput, __version__, _vsj
 from ..records import given
-from .records import filesystem, readable
+from .records import filesystem, is_parquet, readable
 from .store import write_part
 
 DIAGNOSED, REFUSED, FAILED = "diagnosed", "refused", "failed"
@@ -161,9 +161,9 @@ def _identified(measured, options):
 
 def _columns(path):
     """The columns of a Parquet file; ``None`` for a text file, which the library reads itself."""
-    if not path.endswith(".parquet"):
+    if not is_parquet(path):
         return None
     with readable(path, "Parquet"):
         table = parquet.read_table(path)
-    [(_, columns)] = given({name: table[name].to_numpy() for name in table.column_names}, {})
+    [(_, columns)] = given(table, {})
     return columns
