@@ -16,7 +16,7 @@ pub use crate::run::{Run, Sample};
 use crate::schedule::Schedule;
 
 /// Largest number of ticks: a run keeps 48 bytes of each.
-const MOST_TICKS: f64 = 10e6;
+pub const MOST_TICKS: f64 = 10e6;
 
 /// A schedule and the settings of the loop that it is run through.
 #[derive(Clone, Debug)]
