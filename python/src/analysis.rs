@@ -23,6 +23,8 @@ type Course = Vec<(&'static str, Vec<f64>)>;
 struct Answer {
     json: String,
     plant: String,
+    /// Unit of the readings.
+    unit: String,
     remarks: Vec<String>,
     courses: Vec<(String, Course)>,
 }
@@ -32,6 +34,7 @@ impl Answer {
         let answer = PyDict::new(py);
         answer.set_item("json", self.json)?;
         answer.set_item("plant", self.plant)?;
+        answer.set_item("unit", self.unit)?;
         answer.set_item("remarks", self.remarks)?;
         let courses = self.courses.into_iter().map(|(name, course)| Ok((name, arrays(py, course)?)));
         answer.set_item("courses", courses.collect::<PyResult<Vec<_>>>()?)?;
@@ -83,7 +86,8 @@ pub(crate) fn identify<'py>(
             ];
             (it.name, columns)
         };
-        Ok(Answer { json, plant, remarks: records.remarks, courses: found.records.into_iter().map(course).collect() })
+        let courses = found.records.into_iter().map(course).collect();
+        Ok(Answer { json, plant, unit: units.reading, remarks: records.remarks, courses })
     })?;
     answer.into_python(py)
 }
@@ -127,7 +131,8 @@ pub(crate) fn diagnose<'py>(
         let json = serde_json::to_string(&found.report)?;
         let plant = plant_text(&found.plant, &records)?;
         let courses = courses(&found, &records);
-        Ok(Answer { json, plant, remarks: records.remarks, courses })
+        let unit = records.measured[0].units.reading.clone();
+        Ok(Answer { json, plant, unit, remarks: records.remarks, courses })
     })?;
     answer.into_python(py)
 }

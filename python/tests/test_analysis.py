@@ -315,3 +315,13 @@ def test_what_a_mask_hides_is_no_reading(sample):
 def test_a_lazy_frame_is_collected(sample):
     frame = polars.DataFrame(sample)
     assert vsj.identify(frame.lazy()).to_json() == vsj.identify(frame).to_json()
+
+
+def test_a_figure_has_the_unit_and_all_its_axes(diagnosis, sample):
+    assert diagnosis.plot().axes[0].get_ylabel() == "reading (V)"
+    _, axis = pyplot.subplots()
+    for answer in (diagnosis, vsj.Controller().run([100.0])):
+        with pytest.raises(vsj.BadInput, match="axes: 1; expected 2 matplotlib Axes, one above the other, or none"):
+            answer.plot(axis)
+    figure, axes = pyplot.subplots(2, 1)
+    assert diagnosis.plot(axes) is figure

@@ -109,7 +109,7 @@ def diagnose(
     within = None if within is None else float(within)
     answer = _vsj.diagnose(given(data, options), options, named_plant(plant), effort, within)
     warn(answer["remarks"])
-    return Diagnosis._of(answer["json"], plant=answer["plant"], courses=answer["courses"])
+    return Diagnosis._of(answer["json"], plant=answer["plant"], unit=answer["unit"], courses=answer["courses"])
 
 
 def plan(

@@ -402,7 +402,7 @@ class Identified(Answer):
 class Diagnosis(Answer):
     """What a simulation gets wrong on records, and the causes.
 
-    ``plant`` is the text of the plant file of the extended simulation. ``courses`` holds the name of each record and its arrays of
+    ``plant`` is the text of the plant file of the extended simulation, ``unit`` the readings' unit. ``courses`` holds the name of each record and its arrays of
     shape ``(n,)``: ``time_s`` in s, ``voltage_v`` in V, ``reading``, ``baseline``, ``extended`` and their residuals in the
     reading's unit.
     """
@@ -431,6 +431,7 @@ class Diagnosis(Answer):
     would_show: Optional[Margins] = None
     records: List[RecordReport] = field(default_factory=list)
     plant: str = field(init=False, repr=False, compare=False)
+    unit: str = field(init=False, repr=False, compare=False)
     courses: list = field(init=False, repr=False, compare=False)
 
     def __repr__(self):
@@ -460,7 +461,7 @@ class Diagnosis(Answer):
         """Draw readings, both simulations and their residuals over time; returns the matplotlib Figure."""
         from .plots import courses
 
-        return courses(self.courses, ("baseline", "extended"), "", axes)
+        return courses(self.courses, ("baseline", "extended"), self.unit, axes)
 
 
 @dataclass(frozen=True)

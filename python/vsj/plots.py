@@ -1,5 +1,7 @@
 """Figures. matplotlib is imported when the first one is drawn."""
 
+from .records import bad_input
+
 
 def courses(records, models, unit, axes=None):
     """Readings with models, and residuals below them. ``axes`` are two matplotlib Axes, or ``None`` for a new figure."""
@@ -45,7 +47,9 @@ def run(ticks, axes=None):
 
 def _figure(axes, rows):
     if axes is not None:
-        axes = [axes] if rows == 1 and not hasattr(axes, "__len__") else list(axes)
+        axes = list(axes) if hasattr(axes, "__len__") else [axes]
+        if len(axes) != rows or not all(hasattr(it, "figure") for it in axes):
+            raise bad_input(f"axes: {len(axes)}; expected {rows} matplotlib Axes, one above the other, or none")
         return axes[0].figure, axes
     from matplotlib import pyplot
 
