@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::control_loop::{self, ControlLoop, Options};
+use simulation::experiment::MOST_TICKS;
 use simulation::open_loop;
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{Record, Row};
@@ -27,8 +28,8 @@ pub(crate) struct LoopOptions {
     min_v: f64,
     slew_v_per_s: Option<f64>,
     dac_bits: u32,
-    kp: f64,
-    ki: f64,
+    kp: Option<f64>,
+    ki: Option<f64>,
     approach_s: Option<f64>,
     margin: Option<[f64; 4]>,
     rate_hz: f64,
@@ -67,7 +68,7 @@ struct Samples {
 }
 
 impl LoopOptions {
-    fn options(self) -> Result<Options> {
+    fn options(self, plant: &PlantFile) -> Result<Options> {
         let feedback = self.feedback.map(|it| Feedback {
             noise_v: it.noise_v,
             model_uncertainty: it.model_uncertainty,
@@ -78,14 +79,16 @@ impl LoopOptions {
             highest_v: it.highest_v,
             fade_s: it.fade_s,
         });
+        let controller = control_loop::Controller::by_name(&self.controller)?;
+        let gains = control_loop::gains([self.kp, self.ki], controller, plant, self.rate_hz)?;
         Ok(Options {
-            controller: control_loop::Controller::by_name(&self.controller)?,
+            controller,
             limit_v: self.limit_v,
             min_v: self.min_v,
             slew_v_per_s: self.slew_v_per_s,
             dac_bits: self.dac_bits,
-            kp: self.kp,
-            ki: self.ki,
+            kp: gains.proportional,
+            ki: gains.integral_per_s,
             approach_s: self.approach_s,
             margin: self.margin.and_then(Margin::from_values),
             rate_hz: self.rate_hz,
@@ -101,6 +104,9 @@ fn run(control: &mut ControlLoop, targets: &[f64], readings: Option<&[f64]>) -> 
         && readings.len() != targets.len()
     {
         bad_input!("readings: {} values; expected {}, one per target", readings.len(), targets.len());
+    }
+    if targets.len() as f64 > MOST_TICKS {
+        bad_input!("targets: {} values; expected at most {MOST_TICKS} ticks in a run", targets.len());
     }
     let mut inputs = Vec::with_capacity(targets.len());
     for (tick, &target) in targets.iter().enumerate() {
@@ -148,9 +154,8 @@ impl Controller {
     fn new(plant: Plant, options: LoopOptions) -> PyResult<Self> {
         let has_sensor = options.feedback.is_some();
         let load = || {
-            let options = options.options()?;
-            options.check()?;
             let file = load(plant)?;
+            let options = options.options(&file)?;
             Ok((ControlLoop::new(&file, &options)?, file.left_out()))
         };
         let (inner, not_simulated) = load().map_err(exception)?;

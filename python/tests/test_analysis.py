@@ -312,6 +312,23 @@ def test_what_a_mask_hides_is_no_reading(sample):
             vsj.identify(data, time="time", voltage="voltage_v", reading="x")
 
 
+@pytest.mark.parametrize(
+    "call, expected",
+    [
+        (lambda: vsj.identify(SAMPLE, time=0), "time: 0; expected a text"),
+        (lambda: vsj.identify(SAMPLE, reading=["x"]), r"reading: \['x'\]; expected a text"),
+        (lambda: vsj.identify(SAMPLE, columns=3), "columns: int; expected the path of a file"),
+        (lambda: vsj.diagnose(SAMPLE, within="10s"), "within: '10s'; expected a number"),
+        (lambda: vsj.diagnose(SAMPLE, plant=None), "plant: NoneType; expected paper, a plant file, or an answer with a spring"),
+        (lambda: vsj.plan(vsj.identify(SAMPLE)), "diagnosis: Identified; expected a Diagnosis, or the path of its JSON"),
+        (lambda: vsj.plan(SAMPLE, minutes="long"), "expected"),
+    ],
+)
+def test_an_argument_of_another_kind_is_bad_input(call, expected):
+    with pytest.raises(vsj.BadInput, match=expected):
+        call()
+
+
 def test_a_lazy_frame_is_collected(sample):
     frame = polars.DataFrame(sample)
     assert vsj.identify(frame.lazy()).to_json() == vsj.identify(frame).to_json()

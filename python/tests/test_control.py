@@ -123,3 +123,56 @@ def test_a_plant_is_taken_from_an_answer(hysteretic, diagnosis):
     codes = [vsj.Controller(plant).run(targets).code for plant in (hysteretic, diagnosis)]
     np.testing.assert_array_equal(*codes)
     assert np.any(codes[0] != vsj.Controller().run(targets).code)
+
+
+def test_times_of_a_simulation_may_be_stamps_and_durations():
+    expected = vsj.simulate("paper", [0.0, 1.0, 2.5], [0.0, 300.0, 300.0])
+    stamps = np.array(["2026-01-31T00:00:05", "2026-01-31T00:00:06", "2026-01-31T00:00:07.5"], "M8[ms]")
+    for times in (stamps, stamps - stamps[0], pandas.DatetimeIndex(stamps), pandas.Series(stamps).astype("M8[ns]")):
+        np.testing.assert_array_equal(vsj.simulate("paper", times, [0.0, 300.0, 300.0]), expected)
+
+
+def test_what_a_mask_hides_is_missing():
+    hidden = lambda values: np.ma.array(values, mask=[False, True, False])
+    for call in (
+        lambda: vsj.simulate("paper", [0.0, 1.0, 2.0], hidden([0.0, 300.0, 300.0])),
+        lambda: vsj.simulate("paper", hidden([0.0, 1.0, 2.0]), [0.0, 300.0, 300.0]),
+        lambda: vsj.Controller().run(hidden([0, 300, 300])),
+    ):
+        with pytest.raises(vsj.BadInput, match="NaN"):
+            call()
+    sensor = vsj.Controller(feedback=vsj.Feedback())
+    run = sensor.run([100.0] * 3, hidden([0.0, 900.0, 9.0]))
+    sensor.reset()
+    np.testing.assert_array_equal(run.stiffness_v, sensor.run([100.0] * 3, [0.0, np.nan, 9.0]).stiffness_v)
+
+
+def test_a_computation_that_would_not_end_is_refused():
+    for times in ([0.0, 1e9], [0.0, np.inf], [np.nan, np.nan], [0.0, 1e9, 1.0]):
+        with pytest.raises(vsj.BadInput, match="time_s"):
+            vsj.simulate("paper", times, np.zeros(len(times)))
+    with pytest.raises(vsj.BadInput, match="targets: 10000001 values; expected at most 10000000 ticks in a run"):
+        vsj.Controller().run(np.zeros(10_000_001))
+
+
+@pytest.mark.parametrize(
+    "call, expected",
+    [
+        (lambda: vsj.Controller(controller="fast", kp=9), "--kp and --ki apply to the paper controller only"),
+        (lambda: vsj.Controller(controller="none", ki=9), "--kp and --ki apply to the paper controller only"),
+        (lambda: vsj.Controller(overshoot_percent=1), "overshoot_percent applies to the robust controller only"),
+        (lambda: vsj.Controller(dac_bits=12.5), "dac_bits: 12.5; expected a whole number"),
+        (lambda: vsj.Controller(dac_bits="many"), "dac_bits: 'many'; expected a number"),
+        (lambda: vsj.Controller(limit_v="high"), "limit_v: 'high'; expected a number"),
+        (lambda: vsj.Controller(feedback={}), "feedback: dict; expected vsj.Feedback"),
+        (lambda: vsj.Controller(controller="robust", known=[5]), "known: list; expected a mapping"),
+        (lambda: vsj.Controller(None), "plant: NoneType; expected paper, a plant file, or an answer"),
+        (lambda: vsj.Controller(vsj.Spring()), "plant: Spring; expected paper"),
+        (lambda: vsj.Controller().run(["a"]), "targets: values of the type <U1; expected numbers"),
+        (lambda: vsj.Controller().run(np.array(["2026-01-31"], "M8[s]")), "targets: values of the type datetime64"),
+        (lambda: vsj.simulate("paper", [[0.0]], [0.0]), r"time: shape \(1, 1\); expected one dimension"),
+    ],
+)
+def test_an_argument_of_another_kind_is_bad_input(call, expected):
+    with pytest.raises(vsj.BadInput, match=expected):
+        call()

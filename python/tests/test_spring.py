@@ -121,3 +121,12 @@ def test_beside_sysidentpy_on_the_same_record(record):
     rms = lambda error: np.sqrt(np.mean(error**2))
     spring = vsj.Spring(extend="paper", effort="quick").fit(X[:half], y[:half])
     assert rms(y[half:] - spring.predict(X)[half:]) < rms(y[half:] - free)
+
+
+def test_the_score_of_equal_readings_is_that_of_scikit_learn(record):
+    X, y = record
+    spring = vsj.Spring().fit(X, y)
+    assert spring.score(X[:3], np.full(3, 1e9)) == 0.0
+    with pytest.raises(vsj.BadInput, match="y: no reading"):
+        spring.score(X[:3], np.full(3, np.nan))
+    assert spring.score(X, np.ma.array(np.where(y > 400, 1e6, y), mask=y > 400)) == spring.score(X, np.where(y > 400, np.nan, y))

@@ -106,7 +106,7 @@ def diagnose(
         At Ctrl-C, which ends the search.
     """
     options = _options(time, voltage, reading, column, columns, separator, decimal, sort, input)
-    within = None if within is None else float(within)
+    within = optional("within", within)
     answer = _vsj.diagnose(given(data, options), options, named_plant(plant), effort, within)
     warn(answer["remarks"])
     return Diagnosis._of(answer["json"], plant=answer["plant"], unit=answer["unit"], courses=answer["courses"])
@@ -144,14 +144,15 @@ def plan(
     if isinstance(diagnosis, Diagnosis):
         name, text = "diagnosis", diagnosis.to_json()
     else:
-        name = os.fspath(diagnosis)
+        name = _path("diagnosis", diagnosis, "a Diagnosis, or the path of its JSON")
         try:
             with open(name, encoding="utf-8") as file:
                 text = file.read()
         except (OSError, UnicodeDecodeError) as error:
             what = getattr(error, "strerror", None) or "not UTF-8"
             raise _vsj.BadInput(f"{name}: cannot be read: {what}; expected the JSON of `vsj diagnose`") from error
-    json, schedule = _vsj.plan(text, name, minutes, limit_v, slew_v_per_s)
+    bounds = optional("minutes", minutes), optional("limit_v", limit_v), optional("slew_v_per_s", slew_v_per_s)
+    json, schedule = _vsj.plan(text, name, *bounds)
     return Plan._of(json, course=schedule)
 
 
@@ -160,18 +161,35 @@ def named_plant(plant):
     text = getattr(plant, "plant", None)
     if isinstance(text, str):
         return type(plant).__name__, text
-    return os.fspath(plant)
+    return _path("plant", plant, "paper, a plant file, or an answer with a spring")
+
+
+def _path(name, value, expected):
+    """A path as a text; ``name`` and ``expected`` are for the message."""
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    raise _vsj.BadInput(f"{name}: {type(value).__name__}; expected {expected}")
+
+
+def number(name, value):
+    """``value`` as a double; ``name`` is what the message calls it."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise _vsj.BadInput(f"{name}: {value!r}; expected a number") from None
+
+
+def optional(name, value):
+    """``value`` as a double, or None."""
+    return None if value is None else number(name, value)
 
 
 def _options(time, voltage, reading, column, columns, separator, decimal, sort, input):
-    return dict(
-        time=time,
-        voltage=voltage,
-        reading=reading,
-        column=column,
-        columns=columns,
-        separator=separator,
-        decimal=decimal,
-        sort=bool(sort),
-        input=input,
+    texts = dict(
+        time=time, voltage=voltage, reading=reading, column=column, separator=separator, decimal=decimal, input=input
     )
+    for name, text in texts.items():
+        if not (text is None or isinstance(text, str)):
+            raise _vsj.BadInput(f"{name}: {text!r}; expected a text")
+    columns = None if columns is None else _path("columns", columns, "the path of a file")
+    return dict(texts, columns=columns, sort=bool(sort))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _vsj
-from .analysis import Plant, named_plant
-from .records import RecordWarning
+from .analysis import Plant, named_plant, number, optional
+from .records import RecordWarning, unmasked
 
 
 class Limit(IntFlag):
@@ -87,15 +87,16 @@ class Controller:
         Slew limit of the amplifier, in V/s; default: none.
     dac_bits : int
         Width of the DAC, in bits.
-    kp, ki : float
-        Proportional gain, and integral gain in 1/s, of the controller ``"paper"``.
+    kp, ki : float, optional
+        Proportional gain, and integral gain in 1/s, of the controller ``"paper"``; default: 4 and 1.35, less for a spring that is too
+        quick for them.
     approach_s : float, optional
         Time constant of the approach to the target of the controller ``"fast"``, in s.
     known : mapping, optional
         How well the controller ``"robust"`` knows the spring: errors of ``"tau"``, ``"share"`` and ``"gain"``, both ways, in percent,
         0 to 25; what is not in it is exact. Default: ``{"tau": 5, "share": 5}``.
-    overshoot_percent : float
-        Overshoot that the controller ``"robust"`` may cause, in percent of a step, 0 to 20.
+    overshoot_percent : float, optional
+        Overshoot that the controller ``"robust"`` may cause, in percent of a step, 0 to 20; default: 2.
     rate_hz : float
         Ticks per second, 100 to 10 000.
     feedback : Feedback, optional
@@ -104,7 +105,7 @@ class Controller:
     Raises
     ------
     BadInput
-        For the first setting out of its range.
+        For the first setting out of its range, and for one that the controller does not have.
     """
 
     def __init__(
@@ -116,28 +117,30 @@ class Controller:
         min_v: float = 0.0,
         slew_v_per_s: Optional[float] = None,
         dac_bits: int = 12,
-        kp: float = 4.0,
-        ki: float = 1.35,
+        kp: Optional[float] = None,
+        ki: Optional[float] = None,
         approach_s: Optional[float] = None,
         known: Optional[Mapping[str, float]] = None,
-        overshoot_percent: float = 2.0,
+        overshoot_percent: Optional[float] = None,
         rate_hz: float = 1000.0,
         feedback: Optional[Feedback] = None,
     ) -> None:
+        if feedback is not None and not isinstance(feedback, Feedback):
+            raise _vsj.BadInput(f"feedback: {type(feedback).__name__}; expected vsj.Feedback")
+        self.rate_hz = number("rate_hz", rate_hz)
         options = dict(
             controller=controller,
-            limit_v=float(limit_v),
-            min_v=float(min_v),
-            slew_v_per_s=slew_v_per_s,
-            dac_bits=dac_bits,
-            kp=float(kp),
-            ki=float(ki),
-            approach_s=approach_s,
+            limit_v=number("limit_v", limit_v),
+            min_v=number("min_v", min_v),
+            slew_v_per_s=optional("slew_v_per_s", slew_v_per_s),
+            dac_bits=_bits(dac_bits),
+            kp=optional("kp", kp),
+            ki=optional("ki", ki),
+            approach_s=optional("approach_s", approach_s),
             margin=margin(controller, known, overshoot_percent),
-            rate_hz=float(rate_hz),
-            feedback=None if feedback is None else asdict(feedback),
+            rate_hz=self.rate_hz,
+            feedback=None if feedback is None else {name: number(name, value) for name, value in asdict(feedback).items()},
         )
-        self.rate_hz = float(rate_hz)
         self._inner = _vsj.Controller(named_plant(plant), options)
         warn_of(self._inner.not_simulated)
 
@@ -165,8 +168,8 @@ class Controller:
         Run
             Arrays of shape (n,).
         """
-        targets = vector(targets)
-        readings = None if readings is None else vector(readings)
+        targets = vector(targets, "targets")
+        readings = None if readings is None else vector(readings, "readings")
         code, applied, stiffness, limits = self._inner.run(targets, readings)
         time = np.arange(len(targets)) / self.rate_hz
         return Run(time, targets, code, applied, stiffness, limits)
@@ -182,7 +185,8 @@ def simulate(
     plant : str, path, Identified, Diagnosis or Spring
         The spring: ``"paper"``, a plant file, or an answer of this package.
     time : array_like of shape (n,)
-        Increasing times, in s; they are rounded to the nearest tick.
+        Increasing times: numbers in s, time stamps or durations; they are rounded to the nearest tick, of which there are at most
+        10 000 000.
     voltage : array_like of shape (n,)
         Applied voltage from each time on, held until the next, in V.
     rate_hz : float
@@ -196,31 +200,61 @@ def simulate(
     Raises
     ------
     BadInput
-        For a spring that the tick rejects, and times that do not increase.
+        For a spring that the tick rejects, and times that are not finite or do not increase.
     """
-    stiffness, left_out = _vsj.simulate(named_plant(plant), vector(time), vector(voltage), float(rate_hz))
+    time, voltage = _seconds(time), vector(voltage, "voltage")
+    stiffness, left_out = _vsj.simulate(named_plant(plant), time, voltage, number("rate_hz", rate_hz))
     warn_of(left_out)
     return stiffness
 
 
-def margin(controller: str, known: Optional[Mapping[str, float]], overshoot_percent: float) -> Optional[List[float]]:
+def margin(
+    controller: str, known: Optional[Mapping[str, float]], overshoot_percent: Optional[float]
+) -> Optional[List[float]]:
     """The parts that a margin consists of: time constant, share, gain, overshoot; None for a controller that has none."""
+    if controller != "robust" and overshoot_percent is not None:
+        raise _vsj.BadInput("overshoot_percent applies to the robust controller only: expected the controller robust")
     if known is None and controller != "robust":
         return None
+    if known is not None and not isinstance(known, Mapping):
+        raise _vsj.BadInput(f"known: {type(known).__name__}; expected a mapping such as {{'tau': 5}}")
+    overshoot_percent = 2.0 if overshoot_percent is None else overshoot_percent
     known = {"tau": 5.0, "share": 5.0} if known is None else known
     unknown = set(known) - {"tau", "share", "gain"}
     if unknown:
         raise _vsj.BadInput(f"known: {', '.join(sorted(map(str, unknown)))}; expected tau, share or gain")
     parts = [known.get("tau", 0.0), known.get("share", 0.0), known.get("gain", 0.0), overshoot_percent]
-    return [float(part) / 100.0 for part in parts]
+    return [number("known", part) / 100.0 for part in parts]
 
 
-def vector(values):
-    """``values`` as a contiguous array of doubles of shape (n,)."""
-    array = np.ascontiguousarray(values, dtype=np.float64)
+def vector(values, name):
+    """``values`` as a contiguous array of doubles of shape (n,), NaN where a mask hides them; ``name`` is what messages call them."""
+    # A whole number cannot be missing.
+    array = unmasked(values.astype(np.float64) if np.ma.is_masked(values) and values.dtype.kind in "iu" else values)
+    try:
+        if array.dtype.kind in "Mm":
+            raise TypeError
+        array = np.ascontiguousarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise _vsj.BadInput(f"{name}: values of the type {array.dtype}; expected numbers") from None
     if array.ndim != 1:
-        raise _vsj.BadInput(f"shape {array.shape}; expected one dimension")
+        raise _vsj.BadInput(f"{name}: shape {array.shape}; expected one dimension")
     return array
+
+
+def _bits(value):
+    bits = number("dac_bits", value)
+    if not 0 <= bits < 1000 or bits != int(bits):
+        raise _vsj.BadInput(f"dac_bits: {value!r}; expected a whole number")
+    return int(bits)
+
+
+def _seconds(time):
+    """Times in s: durations as such, time stamps from the first one."""
+    array = unmasked(time)
+    if array.dtype.kind == "M" and array.size:
+        array = array - array.flat[0]
+    return vector(array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array, "time")
 
 
 def warn_of(left_out):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from . import _vsj
 from .analysis import Plant, diagnose, identify
 from .control import vector
+from .records import unmasked
 
 
 class Spring:
@@ -45,7 +46,7 @@ class Spring:
         if y is None:
             raise _vsj.BadInput("Spring requires y to be passed, but the target y is None; expected an array of shape (n,)")
         time, voltage = _columns(X)
-        record = (time, voltage, vector(y))
+        record = (time, voltage, vector(y, "y"))
         if self.extend is None:
             self.fitted_ = identify(record, input=self.input)
         else:
@@ -62,10 +63,14 @@ class Spring:
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
         """The coefficient of determination of the prediction: 1 is perfect, 0 is no better than the mean of ``y``."""
-        y = vector(y)
+        y = vector(y, "y")
         there = ~np.isnan(y)
+        if not there.any():
+            raise _vsj.BadInput("y: no reading; expected one or more")
         error = (y - self.predict(X))[there]
-        return 1.0 - float(error @ error) / float(np.sum((y[there] - y[there].mean()) ** 2))
+        spread, left = float(np.sum((y[there] - y[there].mean()) ** 2)), float(error @ error)
+        # As scikit-learn does for readings that are all equal.
+        return 1.0 - left / spread if spread > 0.0 else float(left == 0.0)
 
     def get_params(self, deep=True):
         """The parameters by name."""
@@ -106,7 +111,7 @@ def _not_fitted():
 def _columns(X):
     if hasattr(X, "toarray"):
         raise _vsj.BadInput("X: sparse data is not supported; expected a dense array, such as X.toarray()")
-    array = np.asarray(X)
+    array = unmasked(X)
     if np.iscomplexobj(array):
         raise _vsj.BadInput("X: Complex data not supported; expected real numbers")
     array = array.astype(np.float64)
