@@ -60,16 +60,23 @@ impl OutOfRange {
     }
 }
 
+/// A number that prints in exponential form where plain decimals would have hundreds of digits.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = *self;
+        let exponential = value.is_finite() && value != 0.0 && !(1e-9..1e15).contains(&value.abs());
+        if exponential { write!(f, "{value:e}") } else { write!(f, "{value}") }
+    }
+}
+
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { field, value, lowest, highest, unit } = self;
-        write!(f, "{field} = ")?;
-        // Plain decimals of very large or very small numbers would have hundreds of digits.
-        let exponential = value.is_finite() && *value != 0.0 && !(1e-9..1e15).contains(&value.abs());
-        if exponential { write!(f, "{value:e}") } else { write!(f, "{value}") }?;
-        write!(f, " is not allowed: expected {lowest}")?;
+        write!(f, "{field} = {} is not allowed: expected {}", Short(*value), Short(*lowest))?;
         if lowest != highest {
-            write!(f, " to {highest}")?;
+            write!(f, " to {}", Short(*highest))?;
         }
         write!(f, " {unit}")?;
         // The bound is another setting, which a user who raises this one must raise too.

@@ -256,6 +256,20 @@ impl PlantFile {
         if self.schema == 1 { Ok(()) } else { Err(refused) }
     }
 
+    /// Checks that readings can be converted to stiffness and back.
+    fn check_reading(&self) -> Result<(), OutOfRange> {
+        let Reading { gain, zero } = self.reading.unwrap_or_default();
+        let (lowest, highest) = (f64::MIN_POSITIVE, f64::MAX);
+        if !(lowest..=highest).contains(&gain.abs()) {
+            let unit = "per V, or its negative";
+            return Err(OutOfRange { field: "reading.gain", value: gain, lowest, highest, unit });
+        }
+        if !zero.is_finite() {
+            return Err(OutOfRange { field: "reading.zero", value: zero, lowest: -highest, highest, unit: "" });
+        }
+        Ok(())
+    }
+
     /// Checks whether the tick can run the spring at 10 kHz; at a lower rate a short time constant may still be
     /// rejected.
     ///
@@ -272,6 +286,7 @@ impl PlantFile {
             })?,
             None => self.extended().check(sample_time)?,
         }
+        self.check_reading()?;
         let amplifier = self.amplifier.clone().unwrap_or_default();
         for (field, value, lowest, highest, unit) in [
             ("amplifier.limit_v", amplifier.limit_v, 10.0, 1000.0, "V"),
@@ -297,7 +312,6 @@ impl PlantFile {
         self.check_schema()?;
         let Relaxation { share, tau_s, weights, tau_high_s, tau_high_at_v } = &self.relaxation;
         let some = |value: &Option<f64>| value.iter().copied().collect::<Vec<_>>();
-        let reading = self.reading.unwrap_or_default();
         let (memory, law, leakage) = (self.memory.as_ref(), self.law.as_ref(), self.leakage.as_ref());
         let amplifier = self.amplifier.clone().unwrap_or_default();
         let of_memory = |of: fn(&Memory) -> &Vec<f64>| memory.map(of).cloned().unwrap_or_default();
@@ -310,8 +324,6 @@ impl PlantFile {
             ("relaxation.weights", weights.clone(), -ANY, ANY, ""),
             ("relaxation.tau_high_s", some(tau_high_s), POSITIVE, ANY, "s"),
             ("relaxation.tau_high_at_v", some(tau_high_at_v), POSITIVE, ANY, "V"),
-            ("reading.gain", vec![reading.gain], -ANY, ANY, "per V"),
-            ("reading.zero", vec![reading.zero], -ANY, ANY, ""),
             ("memory.thresholds_v", of_memory(|memory| &memory.thresholds_v), 0.0, ANY, "V"),
             ("memory.weights", of_memory(|memory| &memory.weights), -ANY, ANY, ""),
             ("law.voltage_v", of_law(|law| &law.voltage_v), 0.0, ANY, "V"),
@@ -330,9 +342,7 @@ impl PlantFile {
                 return refused(field, value, lowest, highest, unit);
             }
         }
-        if reading.gain == 0.0 {
-            return refused("reading.gain", 0.0, POSITIVE, ANY, "per V, or its negative");
-        }
+        self.check_reading()?;
         let lengths = |field, found: usize, expected: usize, unit| match found == expected {
             true => Ok(()),
             false => refused(field, found as f64, expected as f64, expected as f64, unit),

@@ -53,6 +53,11 @@ fn errors_are_one_line_with_their_place() {
         (plain.replace("schema = 1", "schema = 2"), "p, line 1, column 10: schema = 2 is not allowed: expected 1 as"),
         (plain.replace("0.2", "-1.0"), "p, line 3, column 9: share = -1 is not allowed: expected 0 to 0.9"),
         (plain.replace("3.0", "nan"), "p, line 4, column 9: tau_s = NaN"),
+        (
+            format!("{plain}[reading]\ngain = 0\n"),
+            "p, line 6, column 8: gain = 0 is not allowed: expected 2.2250738585072014e-308 to 1.7976931348623157e308 per V, or",
+        ),
+        (format!("{plain}[reading]\ngain = 1\nzero = inf\n"), "p, line 7, column 8: zero = inf is not allowed"),
         (plain.replace("3.0", "\"slow\""), "p, line 4, column 9: invalid type: string \"slow\", expected a number or"),
         ("schema = ".into(), "p, line 1"),
         (changed("[10.0, 25.0]", "[10.0, 2500]"), "p, line 15, column 23: thresholds_v = 2500 is not allowed"),
