@@ -46,3 +46,18 @@ fn every_option_of_the_loop_changes_the_settings_for_c() {
         assert!(cases.iter().any(tried), "--{option}");
     }
 }
+
+#[test]
+fn a_changed_file_of_the_example_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    vsj(&[], folder.path());
+    for name in ["main.c", "CMakeLists.txt", "vsj_settings.h", "vsj_tick.h"] {
+        std::fs::write(folder.path().join(name), "changed").unwrap();
+    }
+    std::fs::remove_file(folder.path().join("semihosting.c")).unwrap();
+    let answer = vsj(&["--kp", "5", "--json"], folder.path());
+    assert!(answer.contains(r#""kept":["main.c","CMakeLists.txt"]"#), "{answer}");
+    let is_kept = |name: &str| std::fs::read(folder.path().join(name)).unwrap() == b"changed";
+    assert!(is_kept("main.c") && is_kept("CMakeLists.txt") && !is_kept("vsj_settings.h") && !is_kept("vsj_tick.h"));
+    assert!(folder.path().join("semihosting.c").exists());
+}

@@ -61,6 +61,18 @@ impl Files {
         Ok(())
     }
 
+    /// Writes one file, unless another one of its name is there, which its user may have changed; returns true if that is kept.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add_unless_changed(&mut self, name: &str, text: &str) -> Result<bool> {
+        let is_kept = fs::read(self.folder.join(name)).is_ok_and(|old| old != text.as_bytes());
+        if !is_kept {
+            self.add(name, |out| out.write_all(text.as_bytes()))?;
+        }
+        Ok(is_kept)
+    }
+
     /// Moves all files to their places; returns their paths.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use host_sim::output::export::c::{Answer, text, write};
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::terminal::{json, print, remark, wrote};
 use simulation::control_loop::ControlLoop;
 
 use super::super::loop_arguments::LoopArguments;
@@ -44,8 +44,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let not_simulated = plant.left_out();
     ControlLoop::new(&plant, &options)?;
     let mut files = Files::new(&arguments.out)?;
-    write(&options.settings(&plant), name, &not_simulated, &mut files)?;
+    let kept = write(&options.settings(&plant), name, &not_simulated, &mut files)?;
     let paths = files.finish()?;
-    let answer = Answer::new(&paths, options.rate_hz, not_simulated);
+    for name in &kept {
+        remark(&format!(
+            "{}: kept, since it is not the example's; remove it for a new one",
+            arguments.out.join(name).display()
+        ));
+    }
+    let answer = Answer::new(&paths, &kept, options.rate_hz, not_simulated);
     print(&if arguments.json { json(&answer)? } else { text(&answer) + &wrote(&paths) })
 }

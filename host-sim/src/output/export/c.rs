@@ -11,9 +11,10 @@ use vsj_tick::settings::{All, FAST, Known, NONE, PAPER, ROBUST, Sensor, Spring};
 
 use crate::output::files::Files;
 
-/// Header of the library, and the example.
-const EXAMPLE: [(&str, &str); 8] = [
-    ("vsj_tick.h", include_str!("../../../../capi/include/vsj_tick.h")),
+/// Header of the library, which fits it as the settings do.
+const HEADER: &str = include_str!("../../../../capi/include/vsj_tick.h");
+/// The example, which its user changes.
+const EXAMPLE: [(&str, &str); 7] = [
     ("main.c", include_str!("../../../../capi/example/main.c")),
     ("CMakeLists.txt", include_str!("../../../../capi/example/CMakeLists.txt")),
     ("arm-none-eabi.cmake", include_str!("../../../../capi/example/arm-none-eabi.cmake")),
@@ -28,20 +29,23 @@ const EXAMPLE: [(&str, &str); 8] = [
 pub struct Answer {
     schema: u32,
     files: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    kept: Vec<String>,
     tick_s: f64,
     not_simulated: Vec<String>,
 }
 
 impl Answer {
-    /// The answer about files that were written.
-    pub fn new(paths: &[PathBuf], rate_hz: f64, not_simulated: Vec<String>) -> Self {
+    /// The answer about files that were written, and others that were kept.
+    pub fn new(paths: &[PathBuf], kept: &[&str], rate_hz: f64, not_simulated: Vec<String>) -> Self {
         let files = paths.iter().filter_map(|path| path.file_name());
         let files = files.map(|name| name.to_string_lossy().into_owned()).collect();
-        Self { schema: 1, files, tick_s: 1.0 / rate_hz, not_simulated }
+        let kept = kept.iter().map(|name| (*name).to_owned()).collect();
+        Self { schema: 1, files, kept, tick_s: 1.0 / rate_hz, not_simulated }
     }
 }
 
-/// Adds the settings of a spring, called `name`, and the example.
+/// Adds the settings of a spring, called `name`, and the example; returns the names of its files that are kept because they were changed.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -50,13 +54,17 @@ pub fn write(
     name: &str,
     not_simulated: &[String],
     files: &mut Files,
-) -> Result<()> {
+) -> Result<Vec<&'static str>> {
     let header = header(&All::new(settings), name, not_simulated);
     files.add("vsj_settings.h", |out| out.write_all(header.as_bytes()))?;
+    files.add("vsj_tick.h", |out| out.write_all(HEADER.as_bytes()))?;
+    let mut kept = Vec::new();
     for (name, text) in EXAMPLE {
-        files.add(name, |out| out.write_all(text.as_bytes()))?;
+        if files.add_unless_changed(name, text)? {
+            kept.push(name);
+        }
     }
-    Ok(())
+    Ok(kept)
 }
 
 /// The settings as the constant `VSJ_SETTINGS`. Each number is read back to the bit.
