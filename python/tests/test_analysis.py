@@ -318,6 +318,7 @@ def test_what_a_mask_hides_is_no_reading(sample):
         (lambda: vsj.identify(SAMPLE, time=0), "time: 0; expected a text"),
         (lambda: vsj.identify(SAMPLE, reading=["x"]), r"reading: \['x'\]; expected a text"),
         (lambda: vsj.identify(SAMPLE, columns=3), "columns: int; expected the path of a file"),
+        (lambda: vsj.diagnose(SAMPLE, effort=1), "effort: 1; expected a text"),
         (lambda: vsj.diagnose(SAMPLE, within="10s"), "within: '10s'; expected a number"),
         (lambda: vsj.diagnose(SAMPLE, plant=None), "plant: NoneType; expected paper, a plant file, or an answer with a spring"),
         (lambda: vsj.plan(vsj.identify(SAMPLE)), "diagnosis: Identified; expected a Diagnosis, or the path of its JSON"),

@@ -163,6 +163,7 @@ def test_a_computation_that_would_not_end_is_refused():
         (lambda: vsj.Controller(overshoot_percent=1), "overshoot_percent applies to the robust controller only"),
         (lambda: vsj.Controller(dac_bits=12.5), "dac_bits: 12.5; expected a whole number"),
         (lambda: vsj.Controller(dac_bits="many"), "dac_bits: 'many'; expected a number"),
+        (lambda: vsj.Controller(controller=3), "controller: 3; expected a text"),
         (lambda: vsj.Controller(limit_v="high"), "limit_v: 'high'; expected a number"),
         (lambda: vsj.Controller(feedback={}), "feedback: dict; expected vsj.Feedback"),
         (lambda: vsj.Controller(controller="robust", known=[5]), "known: list; expected a mapping"),

@@ -107,7 +107,7 @@ def diagnose(
     """
     options = _options(time, voltage, reading, column, columns, separator, decimal, sort, input)
     within = optional("within", within)
-    answer = _vsj.diagnose(given(data, options), options, named_plant(plant), effort, within)
+    answer = _vsj.diagnose(given(data, options), options, named_plant(plant), text("effort", effort), within)
     warn(answer["remarks"])
     return Diagnosis._of(answer["json"], plant=answer["plant"], unit=answer["unit"], courses=answer["courses"])
 
@@ -171,6 +171,13 @@ def _path(name, value, expected):
     raise _vsj.BadInput(f"{name}: {type(value).__name__}; expected {expected}")
 
 
+def text(name, value):
+    """``value`` if it is a text; ``name`` is what the message calls it."""
+    if isinstance(value, str):
+        return value
+    raise _vsj.BadInput(f"{name}: {value!r}; expected a text")
+
+
 def number(name, value):
     """``value`` as a double; ``name`` is what the message calls it."""
     try:
@@ -188,8 +195,8 @@ def _options(time, voltage, reading, column, columns, separator, decimal, sort, 
     texts = dict(
         time=time, voltage=voltage, reading=reading, column=column, separator=separator, decimal=decimal, input=input
     )
-    for name, text in texts.items():
-        if not (text is None or isinstance(text, str)):
-            raise _vsj.BadInput(f"{name}: {text!r}; expected a text")
+    for name, value in texts.items():
+        if value is not None:
+            text(name, value)
     columns = None if columns is None else _path("columns", columns, "the path of a file")
     return dict(texts, columns=columns, sort=bool(sort))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _vsj
-from .analysis import Plant, named_plant, number, optional
+from .analysis import Plant, named_plant, number, optional, text
 from .records import RecordWarning, unmasked
 
 
@@ -129,7 +129,7 @@ class Controller:
             raise _vsj.BadInput(f"feedback: {type(feedback).__name__}; expected vsj.Feedback")
         self.rate_hz = number("rate_hz", rate_hz)
         options = dict(
-            controller=controller,
+            controller=text("controller", controller),
             limit_v=number("limit_v", limit_v),
             min_v=number("min_v", min_v),
             slew_v_per_s=optional("slew_v_per_s", slew_v_per_s),
