@@ -68,7 +68,8 @@ struct Samples {
 }
 
 impl LoopOptions {
-    fn options(self, plant: &PlantFile) -> Result<Options> {
+    /// The settings of a loop around a spring, and what the user should know about them, one line each.
+    fn options(self, plant: &PlantFile) -> Result<(Options, Vec<String>)> {
         let feedback = self.feedback.map(|it| Feedback {
             noise_v: it.noise_v,
             model_uncertainty: it.model_uncertainty,
@@ -80,8 +81,9 @@ impl LoopOptions {
             fade_s: it.fade_s,
         });
         let controller = control_loop::Controller::by_name(&self.controller)?;
-        let gains = control_loop::gains([self.kp, self.ki], controller, plant, self.rate_hz)?;
-        Ok(Options {
+        let given = [self.kp, self.ki];
+        let gains = control_loop::gains(given, controller, plant, self.rate_hz)?;
+        let options = Options {
             controller,
             limit_v: self.limit_v,
             min_v: self.min_v,
@@ -93,7 +95,8 @@ impl LoopOptions {
             margin: self.margin.and_then(Margin::from_values),
             rate_hz: self.rate_hz,
             feedback,
-        })
+        };
+        Ok((options, control_loop::lowered(&gains, given)))
     }
 }
 
@@ -142,6 +145,8 @@ pub(crate) struct Controller {
     has_sensor: bool,
     #[pyo3(get)]
     not_simulated: Vec<String>,
+    #[pyo3(get)]
+    remarks: Vec<String>,
 }
 
 /// Codes, applied voltages in V, stiffness in V, limits.
@@ -155,11 +160,11 @@ impl Controller {
         let has_sensor = options.feedback.is_some();
         let load = || {
             let file = load(plant)?;
-            let options = options.options(&file)?;
-            Ok((ControlLoop::new(&file, &options)?, file.left_out()))
+            let (options, remarks) = options.options(&file)?;
+            Ok((ControlLoop::new(&file, &options)?, file.left_out(), remarks))
         };
-        let (inner, not_simulated) = load().map_err(exception)?;
-        Ok(Self { inner, has_sensor, not_simulated })
+        let (inner, not_simulated, remarks) = load().map_err(exception)?;
+        Ok(Self { inner, has_sensor, not_simulated, remarks })
     }
 
     /// Forgets everything: the spring is at rest at 0 V.

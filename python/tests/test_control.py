@@ -177,3 +177,10 @@ def test_a_computation_that_would_not_end_is_refused():
 def test_an_argument_of_another_kind_is_bad_input(call, expected):
     with pytest.raises(vsj.BadInput, match=expected):
         call()
+
+
+def test_lowered_gains_are_said(tmp_path):
+    plant = tmp_path / "quick.toml"
+    plant.write_text("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 0.002\n")
+    with pytest.warns(vsj.RecordWarning, match="--kp 2.0668: the largest for this spring at this rate, instead of 4"):
+        vsj.Controller(plant)

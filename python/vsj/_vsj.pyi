@@ -51,6 +51,7 @@ def predict(plant: _Plant, time_s: _Floats, voltage_v: _Floats, input: str) -> _
 
 class Controller:
     not_simulated: List[str]
+    remarks: List[str]
     def __new__(cls, plant: _Plant, options: Dict[str, Any]) -> "Controller": ...
     @property
     def range_v(self) -> Tuple[float, float]: ...

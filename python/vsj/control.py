@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import _vsj
 from .analysis import Plant, named_plant, number, optional, text
-from .records import RecordWarning, unmasked
+from .records import RecordWarning, unmasked, warn
 
 
 class Limit(IntFlag):
@@ -143,6 +143,7 @@ class Controller:
         )
         self._inner = _vsj.Controller(named_plant(plant), options)
         warn_of(self._inner.not_simulated)
+        warn(self._inner.remarks)
 
     @property
     def range_v(self) -> Tuple[float, float]:

@@ -171,6 +171,18 @@ pub fn gains(given: [Option<f64>; 2], controller: Controller, plant: &PlantFile,
     Ok(Gains { integral_per_s: ki.unwrap_or(gains.integral_per_s), ..gains })
 }
 
+/// What the user should know about gains that are smaller than the report's although no option says so, one line each.
+pub fn lowered(gains: &Gains, [kp, ki]: [Option<f64>; 2]) -> Vec<String> {
+    let Gains { proportional, integral_per_s } = *gains;
+    let usual = Gains::PAPER;
+    let each = [("--kp", kp, proportional, usual.proportional), ("--ki", ki, integral_per_s, usual.integral_per_s)];
+    let smaller = each.into_iter().filter(|(_, given, value, usual)| given.is_none() && value < usual);
+    let said = smaller.map(|(option, _, value, usual)| {
+        format!("{option} {value:.4}: the largest for this spring at this rate, instead of {usual}")
+    });
+    said.collect()
+}
+
 /// A margin in a file.
 mod margin {
     use model::Margin;

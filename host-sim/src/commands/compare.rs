@@ -3,14 +3,13 @@
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::compare::text;
-use host_sim::output::terminal::{json, print};
+use host_sim::output::terminal::{json, print, remark};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::comparison::{Actual, compare};
-use simulation::control_loop::{Controller, gains};
+use simulation::control_loop::{Controller, gains, lowered};
 use simulation::option_names::{SETTINGS, named};
 
-use super::loop_arguments::remark_on_gains;
 use super::plant;
 use super::spring_error::{ErrorOf, Known, together};
 
@@ -87,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let actual = arguments.actual()?;
     let margin = arguments.known.margin()?;
     let gains = gains([None; 2], Controller::Paper, &file, arguments.rate_hz)?;
-    remark_on_gains(&gains, [None; 2]);
+    lowered(&gains, [None; 2]).iter().for_each(|text| remark(text));
     let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)
         .map_err(|error| named(error, SETTINGS))?;
     print(&if arguments.json { json(&comparison)? } else { text(&comparison) })

@@ -2,8 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use model::Gains;
-use simulation::control_loop::{Controller, Options, gains};
+use simulation::control_loop::{Controller, Options, gains, lowered};
 use simulation::plant_file::PlantFile;
 
 use host_sim::output::terminal::remark;
@@ -60,7 +59,7 @@ impl LoopArguments {
         let default = if margin.is_some() { Controller::Robust } else { Controller::Paper };
         let controller = self.controller.unwrap_or(default);
         let gains = gains([kp, ki], controller, plant, rate_hz)?;
-        remark_on_gains(&gains, [kp, ki]);
+        lowered(&gains, [kp, ki]).iter().for_each(|text| remark(text));
         let feedback = None;
         let options = Options {
             controller,
@@ -77,18 +76,5 @@ impl LoopArguments {
         };
         options.check()?;
         Ok(options)
-    }
-}
-
-/// Remarks on gains that are smaller than the report's although no option says so.
-pub(crate) fn remark_on_gains(gains: &Gains, [kp, ki]: [Option<f64>; 2]) {
-    let Gains { proportional, integral_per_s } = *gains;
-    let usual = Gains::PAPER;
-    for (option, given, value, usual) in
-        [("--kp", kp, proportional, usual.proportional), ("--ki", ki, integral_per_s, usual.integral_per_s)]
-    {
-        if given.is_none() && value < usual {
-            remark(&format!("{option} {value:.4}: the largest for this spring at this rate, instead of {usual}"));
-        }
     }
 }
