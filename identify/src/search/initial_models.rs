@@ -66,7 +66,7 @@ pub(super) fn initial_models(data: &Data, tau_s: f64, share: f64, allows: impl F
 
 /// Returns the models with a delay, of the causes that the search `allows`, of a spring that has `share`; none if a delay explains nothing.
 pub(super) fn late_models(data: &Data, share: f64, allows: impl Fn(&str) -> bool) -> Vec<Model> {
-    let Some((delay_s, fit)) = late(data).filter(|_| allows("delay")) else { return Vec::new() };
+    let Some((delay_s, fit)) = allows("delay").then(|| late(data)).flatten() else { return Vec::new() };
     let late = |delay_s: f64| Some(Model::default().with(block("delay", 0), delay_near(delay_s, data)?));
     let found = fit.share.clamp(0.0, 1.0);
     let differs = (found - share).abs() > SMALLEST_DIFFERENCE && allows("instantaneous-share");
@@ -85,7 +85,7 @@ fn late(data: &Data) -> Option<(f64, FirstOrder)> {
     }
     let every = data.rows().div_ceil(ROWS);
     let rows: Vec<usize> = (0..data.rows()).step_by(every).collect();
-    let fitted = |late: usize, range_s: Option<f64>| {
+    let fitted = |late: usize, near_s: Option<f64>| {
         let row = |&row: &usize| Row {
             line: row,
             time_s: data.time_s[row],
@@ -94,7 +94,7 @@ fn late(data: &Data) -> Option<(f64, FirstOrder)> {
         };
         let record = Record { name: String::new(), rows: rows.iter().map(row).collect() };
         let of = Rows::new(&record, false, data.normalisation.even);
-        let Some(tau_s) = range_s else { return of.best() };
+        let Some(tau_s) = near_s else { return of.best() };
         let fits = (-TIME_CONSTANTS..=TIME_CONSTANTS).filter_map(|step| of.at(tau_s * RATIO.powi(step)));
         fits.min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))
     };
