@@ -108,6 +108,29 @@ fn a_shift_in_one_record_is_found_beside_a_shared_cause_and_nothing_else() {
     assert!(report.records[1].findings[0].probability > 0.95, "{:#?}", report.records);
 }
 
+/// The gain of one record hides what all of them share, which is not to be taken out of them with it. The errors of the simulation are those
+/// of the readings as they are.
+#[test]
+fn a_gain_of_one_record_does_not_hide_shared_causes() {
+    let volts = [300.0, 0.0, 500.0, 250.0, 100.0];
+    let of = |name: &str, gain: f64| record(name, gain, 7.0, &Test { volts, ..PLAIN });
+    let records = [of("first", 1.0), of("second", 1.1), of("third one", 1.0)];
+    let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
+    let report = &several.report;
+    assert!(causes(&several).contains(&"time-constant"), "{report:#?}");
+    let has_gain = |name: &str| {
+        let of = report.records.iter().find(|of| of.name == name).unwrap();
+        of.findings.iter().any(|finding| finding.cause == "gain-error")
+    };
+    assert!(has_gain("second"), "{report:#?}");
+    let simulated: Vec<f64> =
+        several.data.reading.iter().zip(&several.baseline.residual).map(|(reading, left)| reading - left).collect();
+    // Less the zero of each record, at most 500 V; with the fault 550 V.
+    assert!(simulated.iter().all(|volts| (-20.0..520.0).contains(volts)), "{simulated:?}");
+    let rmse = (several.baseline.residual.iter().map(|left| left * left).sum::<f64>() / 1500.0).sqrt();
+    assert!((report.baseline.rmse - rmse).abs() < 1e-9, "{} {rmse}", report.baseline.rmse);
+}
+
 /// A gain that is off by 0.12 %, with a noise of 2 V: most records do not show it alone.
 #[test]
 fn a_cause_that_most_records_do_not_show_alone_is_found_in_all_of_them() {

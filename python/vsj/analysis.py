@@ -182,7 +182,7 @@ def number(name, value):
     """``value`` as a double; ``name`` is what the message calls it."""
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise _vsj.BadInput(f"{name}: {value!r}; expected a number") from None
 
 

@@ -231,7 +231,10 @@ def margin(
 def vector(values, name):
     """``values`` as a contiguous array of doubles of shape (n,), NaN where a mask hides them; ``name`` is what messages call them."""
     # A whole number cannot be missing.
-    array = unmasked(values.astype(np.float64) if np.ma.is_masked(values) and values.dtype.kind in "iu" else values)
+    try:
+        array = unmasked(values.astype(np.float64) if np.ma.is_masked(values) and values.dtype.kind in "iu" else values)
+    except ValueError:
+        raise _vsj.BadInput(f"{name}: rows of different lengths; expected one dimension of numbers") from None
     try:
         if array.dtype.kind in "Mm":
             raise TypeError
@@ -252,7 +255,10 @@ def _bits(value):
 
 def _seconds(time):
     """Times in s: durations as such, time stamps from the first one."""
-    array = unmasked(time)
+    try:
+        array = unmasked(time)
+    except ValueError:
+        raise _vsj.BadInput("time: rows of different lengths; expected one dimension of numbers") from None
     if array.dtype.kind == "M" and array.size:
         array = array - array.flat[0]
     return vector(array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array, "time")

@@ -27,7 +27,7 @@ pub fn simulate(spring: &impl Model, rate_hz: f64, time_s: &[f64], voltage_v: &[
         bad_input!("time_s = {} after {}; expected increasing times", pair[1], pair[0]);
     }
     let ticks = (time_s.last().copied().unwrap_or(start) - start) * rate_hz;
-    if ticks >= MOST_TICKS {
+    if ticks > MOST_TICKS {
         bad_input!("time_s: {} ticks at {rate_hz} Hz; expected at most {MOST_TICKS}", number(ticks));
     }
     let mut state = Default::default();

@@ -530,6 +530,12 @@ fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
     assert!(slashes.contains("line 4, column Date: `2/3/2026` is not a date such as 2026-01-31 or 31.01"), "{slashes}");
     let stays = "Date;Time;u_V;x_mm\n1/31/2026;23:59:59;0;1\n1/31/2026;0:00:01;0;1\n";
     assert_eq!(times(stays).0, [0.0, 2.0]);
+    let merged = "Date;Time;u_V;x_mm\n2026-01-31;23:59:59;0;1\n2026-02-01;0:00:01;0;1\n;0:00:02;0;1\n";
+    assert_eq!(times(merged).0, [0.0, 2.0, 3.0]);
+    let over_midnight = "Date;Time;u_V;x_mm\n1/31/2026;23:59:59;0;1\n2/1/2026;0:00:01;0;1\n2/1/2026;0:00:02;0;1\n";
+    assert_eq!(times(over_midnight).0, [0.0, 2.0, 3.0]);
+    let hours = "Date;Time;u_V;x_mm\n2026-01-31;26:00:00;0;1\n2026-02-01;26:00:01;0;1\n";
+    assert_eq!(times(hours).0, [0.0, 1.0]);
     let stopwatch = "Date;Time;u_V;x_mm\n2026-01-31;0:00:01;0;1\n2026-02-01;0:00:02;0;1\n";
     let error = read(stopwatch, &Format::default()).unwrap_err();
     assert!(error.contains("line 3, column Time: `0:00:02` follows a smaller time while the date changes"), "{error}");

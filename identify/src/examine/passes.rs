@@ -141,14 +141,14 @@ impl Normalised {
         if is_better { self } else { other }
     }
 
-    /// Returns the record of this diagnosis as it would be without the causes that were found, but for those that `stay`.
-    pub(super) fn without_causes(&self, record: &Record, stay: impl Fn(&str) -> bool) -> Record {
+    /// Returns the record of this diagnosis as it would be without those of the causes that were found for which `is_fault` is true.
+    pub(super) fn without_faults(&self, record: &Record, is_fault: impl Fn(&str) -> bool) -> Record {
         let Diagnosis { data, base, extended, .. } = &self.found;
         let mut simulator = Simulator::new(data, base);
         let [mut with, mut without] = [Vec::new(), Vec::new()];
         simulator.run(&extended.model, &mut with);
         let mut rest = extended.model.clone();
-        rest.blocks.retain(|(block, _)| stay(block.cause()));
+        rest.blocks.retain(|(block, _)| !is_fault(block.cause()));
         simulator.run(&rest, &mut without);
         let reading = data.scales().reading;
         let mut changes = with.iter().zip(&without).map(|(with, without)| reading * (with - without));

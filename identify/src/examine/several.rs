@@ -10,6 +10,7 @@
 //! 4. Each record is diagnosed on its own against the spring with the shared causes; what is found there is in that record only: a
 //!    fault, not a property of the spring.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use anyhow::Result;
@@ -24,7 +25,7 @@ use crate::examine::passes::{self, Normalised, examine, informative, joint, repo
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
-use crate::stats::scale::root_mean_square;
+use crate::stats::scale::{centred, root_mean_square};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
@@ -68,17 +69,20 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let mut joint = shared(records, records, options, &shown, &mut progress)?;
     let mut each = of_each(records, &joint, options, &mut progress)?;
     // A fault of one record biases what is found in all of them, and that in turn the fault.
+    let mut faultless = Cow::Borrowed(records);
     for _ in 0..ROUNDS {
         if !is_biased(&joint, &each) {
             break;
         }
-        // A cause of the spring that is found again in a record is what the bias left there.
-        let less =
-            |(record, alone): (&Record, &Normalised)| alone.without_causes(record, |cause| is_in_spring(&joint, cause));
-        let less: Vec<Record> = records.iter().zip(&each).map(less).collect();
-        joint = shared(&less, records, options, &shown, &mut progress)?;
+        let less = without_faults(records, &joint, &each);
+        if less == *faultless {
+            break;
+        }
+        faultless = Cow::Owned(less);
+        joint = shared(&faultless, records, options, &shown, &mut progress)?;
         each = of_each(records, &joint, options, &mut progress)?;
     }
+    with_faults(&mut joint, records, &faultless);
     // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
@@ -115,6 +119,43 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     compare(&mut joint, linear.as_ref().filter(|_| !held.iter().any(reports)));
     credibility::unlikely_to_suspects(&mut joint.report);
     Ok(joint)
+}
+
+/// Returns the records without the likely causes that are found in one of them only. A cause of the spring that is found again in a record
+/// is what the bias left there.
+fn without_faults(records: &[Record], joint: &Diagnosis, each: &[Normalised]) -> Vec<Record> {
+    let has = |alone: &Normalised, cause: &str| {
+        alone.found.report.findings.iter().any(|finding| finding.cause == cause && finding.is_likely())
+    };
+    let is_fault =
+        |cause: &str| !is_in_spring(joint, cause) && each.iter().filter(|alone| has(alone, cause)).count() == 1;
+    let less = |(record, alone): (&Record, &Normalised)| {
+        alone.without_faults(record, |cause| has(alone, cause) && is_fault(cause))
+    };
+    records.iter().zip(each).map(less).collect()
+}
+
+/// Gives the errors of the simulation as it is given the faults back, without which the records were compared with it.
+fn with_faults(joint: &mut Diagnosis, records: &[Record], faultless: &[Record]) {
+    let readings = |of: &[Record]| -> Vec<f64> {
+        of.iter().flat_map(|record| record.rows.iter().filter_map(|row| row.measured)).collect()
+    };
+    let (read, less) = (readings(records), readings(faultless));
+    for residual in [&mut joint.baseline.residual, &mut joint.held_out[0]] {
+        residual.iter_mut().zip(&read).zip(&less).for_each(|((left, read), less)| *left += read - less);
+    }
+    let [rmse, held_out_rmse] =
+        [&joint.baseline.residual, &joint.held_out[0]].map(|residual| root_mean_square(residual));
+    let spread = root_mean_square(&centred(&read));
+    let Report { baseline, extended, findings, .. } = &mut joint.report;
+    if read == less || rmse <= 0.0 {
+        return;
+    }
+    (baseline.rmse, baseline.held_out_rmse) = (rmse, held_out_rmse);
+    baseline.fit_percent = 100.0 * (1.0 - rmse / spread);
+    if !findings.is_empty() {
+        extended.gain = 1.0 - extended.quality.held_out_rmse / held_out_rmse.max(1e-12);
+    }
 }
 
 /// True if some record has a fault, and either no causes explain all records or one of them is found in that record again.

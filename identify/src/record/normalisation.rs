@@ -3,10 +3,11 @@
 //! | scale | from the nominal spring | from the record, where that is off by more |
 //! | --- | --- | --- |
 //! | time | its first time constant | than a factor of `FAR_TIME_CONSTANT` |
-//! | voltage | the voltage of its `tau_high_at_v`; 500 V for readings in V of the paper's spring | than a factor of `FAR_SIZE` |
+//! | voltage | the voltage of its `tau_high_at_v`; without one 500 V, if commands are in V and none is larger | than a factor of `FAR_SIZE` |
 //! | reading | its gain | than a factor of `FAR_SIZE`, or in sign |
 //!
-//! For other readings, without `tau_high_at_v`, the largest voltage of the record is used: no voltage has a meaning of its own.
+//! For other commands, without `tau_high_at_v`, the largest one of the record is used: none has a meaning of its own. Readings in V of
+//! the paper's spring keep 500 V beyond.
 //!
 //! The record's own time constant, gain and zero are those of a quick first-order fit. They are also where the search starts if
 //! the nominal spring is far from the record ([`Start`]).
@@ -91,8 +92,6 @@ impl Normalisation {
     pub fn of(record: &Record, nominal: &PlantFile, input: Input, units: Units) -> Self {
         let reading = nominal.reading.unwrap_or_default();
         let (tau_s, share, even) = (first_time_constant(nominal), nominal.relaxation.share, nominal.even);
-        let paper_v = nominal.reading.is_none().then_some(Relaxation::HIGH_V);
-        let reference_v = nominal.relaxation.tau_high_at_v.or(paper_v);
         let mut scales = Scales { zero: reading.zero, units, ..Scales::default() };
         if input == Input::Stair {
             // The stair has its own times and voltages, in s and V.
@@ -101,6 +100,10 @@ impl Normalisation {
         }
         let full_scale_v = record.rows.iter().map(|row| row.voltage_v.abs()).fold(0.0, f64::max);
         let far = |ratio: f64, times: f64| !(1.0 / times..=times).contains(&ratio);
+        // The paper's spring is curved over 500 V, and so are others in V whose record stays within.
+        let is_usual =
+            nominal.reading.is_none() || scales.units.voltage.si == 1.0 && full_scale_v <= Relaxation::HIGH_V;
+        let reference_v = nominal.relaxation.tau_high_at_v.or(is_usual.then_some(Relaxation::HIGH_V));
         let given = reference_v.filter(|volts| full_scale_v <= 0.0 || !far(full_scale_v / volts, FAR_SIZE));
         let volts = given.unwrap_or(if full_scale_v > 0.0 { full_scale_v } else { Relaxation::HIGH_V });
 

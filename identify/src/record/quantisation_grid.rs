@@ -24,7 +24,7 @@ pub struct QuantisationGrid {
 
 /// Relative uncertainty of a step that is not limited by printed digits.
 const RELATIVE_ERROR: f64 = 1e-6;
-/// Largest number of decimals, or of significant digits, that is taken for deliberate rounding.
+/// Largest number of significant digits that is taken for deliberate rounding; one more than that of decimals.
 const MOST_DIGITS: i32 = 9;
 
 impl QuantisationGrid {
@@ -96,7 +96,7 @@ fn is_whole(units: f64) -> bool {
     (units - units.round()).abs() < RELATIVE_ERROR * units.abs().max(1.0).sqrt()
 }
 
-/// Returns the unit of the last printed digit, for each value, if there are at most [`MOST_DIGITS`] decimals.
+/// Returns the unit of the last printed digit, for each value, if there are fewer than [`MOST_DIGITS`] decimals.
 fn decimals(values: &[f64]) -> Option<Vec<f64>> {
     let unit = |digits: i32| 10f64.powi(digits);
     let digits = (0..MOST_DIGITS).find(|&digits| values.iter().all(|value| is_whole(value * unit(digits))))?;

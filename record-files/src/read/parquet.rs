@@ -39,9 +39,9 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     }
     let pairs = || metadata.key_value_metadata().into_iter().flatten();
     let of_arrow = pairs().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
-    let durations = of_arrow.map(arrow::durations).unwrap_or_default();
-    let units = units(pairs());
     let schema = metadata.schema_descr();
+    let durations = of_arrow.map(|text| arrow::durations(text, schema.num_columns())).unwrap_or_default();
+    let units = units(pairs());
     let flat = (0..schema.num_columns()).filter(|index| schema.column(*index).max_rep_level() == 0);
     let flat: Vec<usize> = flat.collect();
     let named = |index: &usize| {

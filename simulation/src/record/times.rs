@@ -49,6 +49,8 @@ struct Dates {
     columns: Vec<(usize, String)>,
     /// The first one whose date has changed: its dates are the days of the times.
     changed: Option<usize>,
+    /// Days from the first date to the last one.
+    days: i128,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +99,9 @@ impl Clock {
                 if stamp.form == Form::TimeOfDay {
                     self.is_stopwatch |= stamp.nanoseconds >= DAY_NS;
                     let had_changed = self.dates.changed.is_some();
-                    if let Some(days) = self.dates.days(row)? {
+                    let wraps = self.last - stamp.nanoseconds >= DAY_NS / 2;
+                    let days = if self.is_stopwatch { None } else { self.dates.days(row, wraps)? };
+                    if let Some(days) = days {
                         if !had_changed && first.nanoseconds < MINUTE_NS && stamp.nanoseconds > self.last {
                             bad_input!(
                                 "{}: `{text}` follows a smaller time while the date changes, as a stopwatch does; expected times of day, or \
@@ -136,20 +140,27 @@ impl Dates {
         let is_like =
             |text: &str| date(text).is_some() || text.split('/').filter(|part| is_digits(part, 1, 4)).count() == 3;
         let cells = row.cells().enumerate().filter(|(index, text)| *index != time && is_like(text));
-        Self { columns: cells.map(|(index, text)| (index, text.to_owned())).collect(), changed: None }
+        Self { columns: cells.map(|(index, text)| (index, text.to_owned())).collect(), changed: None, days: 0 }
     }
 
-    /// Days from the first date to that of a row; `None` as long as no date has changed. Where a sheet has merged cells, a date
-    /// is in the first of them only.
+    /// Days from the first date to that of a row; `None` as long as no date has changed, or if dates in another form change where the
+    /// clock begins again (`wraps`), which shows the day as well. Where a sheet has merged cells, a date is in the first of them only.
     ///
     /// # Errors
     /// [`crate::bad_input::BadInput`] with file, line and column of another form of date.
-    fn days(&mut self, row: &Row<'_>) -> Result<Option<i128>> {
+    fn days(&mut self, row: &Row<'_>, wraps: bool) -> Result<Option<i128>> {
         let has_changed = |(index, first): &(usize, String)| !row.text(*index).is_empty() && row.text(*index) != first;
         self.changed = self.changed.or_else(|| self.columns.iter().position(has_changed));
         let Some((index, first)) = self.changed.map(|place| &self.columns[place]) else { return Ok(None) };
+        if row.text(*index).is_empty() {
+            return Ok(Some(self.days));
+        }
         match date(first).zip(date(row.text(*index))) {
-            Some((first, date)) => Ok(Some(date.signed_duration_since(first).num_days().into())),
+            Some((first, date)) => {
+                self.days = date.signed_duration_since(first).num_days().into();
+                Ok(Some(self.days))
+            }
+            None if wraps => Ok(None),
             None => {
                 Err(row.is_not(*index, "a date such as 2026-01-31 or 31.01.2026; expected one with every time of day"))
             }
