@@ -131,6 +131,22 @@ fn a_gain_of_one_record_does_not_hide_shared_causes() {
     assert!((report.baseline.rmse - rmse).abs() < 1e-9, "{} {rmse}", report.baseline.rmse);
 }
 
+/// Readings on a coarse grid repeat, and would look free of noise.
+#[test]
+fn one_coarse_record_does_not_outweigh_the_others() {
+    let volts = [300.0, 0.0, 500.0, 250.0, 100.0];
+    let mut records = ["first", "second", "third one"].map(|name| record(name, 1.0, 6.0, &Test { volts, ..PLAIN }));
+    records[2]
+        .rows
+        .iter_mut()
+        .for_each(|row| row.measured = row.measured.map(|reading| (reading / 20.0).round() * 20.0));
+    let several = examine_several(&records, &Options::default(), |_| ()).unwrap();
+    let report = &several.report;
+    assert_eq!(causes(&several), ["time-constant"], "{report:#?}");
+    let faults = report.records.iter().map(|of| of.findings.iter().map(|finding| finding.cause).collect());
+    assert_eq!(faults.collect::<Vec<Vec<&str>>>(), [vec![], vec![], vec!["quantisation"]], "{:#?}", report.records);
+}
+
 /// A gain that is off by 0.12 %, with a noise of 2 V: most records do not show it alone.
 #[test]
 fn a_cause_that_most_records_do_not_show_alone_is_found_in_all_of_them() {

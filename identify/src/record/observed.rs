@@ -118,20 +118,23 @@ impl Observed {
     /// Joins the properties of several records. A grid or a bound is one of the sensor if all records have it; the weights follow
     /// from the noise of each record.
     fn joined(records: &[Self]) -> Self {
-        let scales: Vec<f64> = records.iter().map(|record| record.scatter_v).collect();
+        let common = |of: fn(&Self) -> Option<f64>| {
+            of(&records[0]).filter(|_| records.iter().all(|record| of(record) == of(&records[0])))
+        };
+        let step = common(|record| record.grid.map(|grid| grid.step));
+        // Readings on a grid of their own repeat, and would look free of noise: rounding is a part of it.
+        let rounding =
+            |record: &Self| record.grid.filter(|_| step.is_none()).map_or(0.0, |grid| grid.step / 12f64.sqrt());
+        let scales: Vec<f64> = records.iter().map(|record| record.scatter_v.max(rounding(record))).collect();
         let rows: usize = records.iter().map(|record| record.kinds.len()).sum();
-        let of_rows = |record: &Self| record.kinds.len() as f64 * record.scatter_v.ln();
-        let scatter_v = (records.iter().map(of_rows).sum::<f64>() / rows as f64).exp();
+        let of_rows = |(record, scale): (&Self, &f64)| record.kinds.len() as f64 * scale.ln();
+        let scatter_v = (records.iter().zip(&scales).map(of_rows).sum::<f64>() / rows as f64).exp();
         let weights = records.iter().zip(&scales).flat_map(|(record, scale)| {
             let own = record.weights.clone();
             let weight = move |row: usize| own.as_ref().map_or(1.0, |own| own[row]) * scatter_v / scale;
             (0..record.kinds.len()).map(weight)
         });
         let weights: Arc<[f64]> = weights.collect();
-        let common = |of: fn(&Self) -> Option<f64>| {
-            of(&records[0]).filter(|_| records.iter().all(|record| of(record) == of(&records[0])))
-        };
-        let step = common(|record| record.grid.map(|grid| grid.step));
         Self {
             kinds: records.iter().flat_map(|record| record.kinds.iter().copied()).collect(),
             grid: records[0].grid.filter(|_| step.is_some()),
