@@ -82,7 +82,9 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
         joint = shared(&faultless, records, options, &shown, &mut progress)?;
         each = of_each(records, &joint, options, &mut progress)?;
     }
-    with_faults(&mut joint, records, &faultless);
+    if let Cow::Owned(faultless) = &faultless {
+        with_faults(&mut joint, records, faultless);
+    }
     // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
@@ -148,9 +150,6 @@ fn with_faults(joint: &mut Diagnosis, records: &[Record], faultless: &[Record]) 
         [&joint.baseline.residual, &joint.held_out[0]].map(|residual| root_mean_square(residual));
     let spread = root_mean_square(&centred(&read));
     let Report { baseline, extended, findings, .. } = &mut joint.report;
-    if read == less || rmse <= 0.0 {
-        return;
-    }
     (baseline.rmse, baseline.held_out_rmse) = (rmse, held_out_rmse);
     baseline.fit_percent = 100.0 * (1.0 - rmse / spread);
     if !findings.is_empty() {

@@ -7,6 +7,8 @@
 //!
 //! For each time constant of a grid the other four parameters are linear: ordinary least squares.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{SMatrix, SVector};
 
 use simulation::record::Record;
@@ -65,7 +67,16 @@ impl<'r> Rows<'r> {
     pub(crate) fn best(&self) -> Option<FirstOrder> {
         let (shortest, longest) = self.range_s();
         let count = ((longest / shortest).ln() / RATIO.ln()).ceil().max(0.0) as i32;
-        let fits = (0..=count).filter_map(|index| self.at(shortest * RATIO.powi(index)));
+        self.best_of(shortest, 0..=count)
+    }
+
+    /// Returns the same over the time constants of the grid around one, in s, at most `steps` away.
+    pub(crate) fn best_near(&self, tau_s: f64, steps: i32) -> Option<FirstOrder> {
+        self.best_of(tau_s, -steps..=steps)
+    }
+
+    fn best_of(&self, tau_s: f64, steps: RangeInclusive<i32>) -> Option<FirstOrder> {
+        let fits = steps.filter_map(|step| self.at(tau_s * RATIO.powi(step)));
         fits.min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))
     }
 

@@ -25,9 +25,9 @@ const SMALLEST_DIFFERENCE: f64 = 0.03;
 
 /// A delay is believed with which a first-order fit leaves less than this fraction of the squared error of the fit without.
 const BELIEVED: f64 = 0.8;
-/// Ratio of neighbouring delays that are tried, and of neighbouring time constants; number of these on either side of the best without
-/// a delay.
+/// Ratio of neighbouring delays that are tried.
 const RATIO: f64 = 1.25;
+/// Number of time constants that are tried on either side of the best without a delay.
 const TIME_CONSTANTS: i32 = 5;
 /// Longest delay, in lengths of the record.
 const LONGEST: f64 = 0.1;
@@ -94,9 +94,7 @@ fn late(data: &Data) -> Option<(f64, FirstOrder)> {
         };
         let record = Record { name: String::new(), rows: rows.iter().map(row).collect() };
         let of = Rows::new(&record, false, data.normalisation.even);
-        let Some(tau_s) = near_s else { return of.best() };
-        let fits = (-TIME_CONSTANTS..=TIME_CONSTANTS).filter_map(|step| of.at(tau_s * RATIO.powi(step)));
-        fits.min_by(|a, b| a.unexplained.total_cmp(&b.unexplained))
+        near_s.map_or_else(|| of.best(), |tau_s| of.best_near(tau_s, TIME_CONSTANTS))
     };
     let without = fitted(0, None)?;
     let longest = (LONGEST * data.rows() as f64) as usize;

@@ -14,8 +14,7 @@ use crate::record::observed::{Kind, Observed};
 use crate::record::scales::Scales;
 use crate::search::{Scored, WarmStart};
 
-use crate::stats::scale::centred;
-use crate::stats::sums::dot;
+use crate::stats::scale::{centred, root_mean_square};
 use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
 use crate::verdict::credibility;
@@ -219,8 +218,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
 
 /// Returns the mean square of readings about their mean.
 pub(crate) fn power(reading: &[f64]) -> f64 {
-    let centred = centred(reading);
-    dot(&centred, &centred) / centred.len() as f64
+    root_mean_square(&centred(reading)).powi(2)
 }
 
 /// All findings, the one that explains the largest mean square error first.
