@@ -231,10 +231,7 @@ def margin(
 def vector(values, name):
     """``values`` as a contiguous array of doubles of shape (n,), NaN where a mask hides them; ``name`` is what messages call them."""
     # A whole number cannot be missing.
-    try:
-        array = unmasked(values.astype(np.float64) if np.ma.is_masked(values) and values.dtype.kind in "iu" else values)
-    except ValueError:
-        raise _vsj.BadInput(f"{name}: rows of different lengths; expected one dimension of numbers") from None
+    array = _array(values.astype(np.float64) if np.ma.is_masked(values) and values.dtype.kind in "iu" else values, name)
     try:
         if array.dtype.kind in "Mm":
             raise TypeError
@@ -246,6 +243,14 @@ def vector(values, name):
     return array
 
 
+def _array(values, name):
+    """``values`` as an array in which what a mask hides is missing; ``name`` is what messages call them."""
+    try:
+        return unmasked(values)
+    except ValueError:
+        raise _vsj.BadInput(f"{name}: rows of different lengths; expected one dimension of numbers") from None
+
+
 def _bits(value):
     bits = number("dac_bits", value)
     if not 0 <= bits < 1000 or bits != int(bits):
@@ -255,10 +260,7 @@ def _bits(value):
 
 def _seconds(time):
     """Times in s: durations as such, time stamps from the first one."""
-    try:
-        array = unmasked(time)
-    except ValueError:
-        raise _vsj.BadInput("time: rows of different lengths; expected one dimension of numbers") from None
+    array = _array(time, "time")
     if array.dtype.kind == "M" and array.size:
         array = array - array.flat[0]
     return vector(array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array, "time")
