@@ -1,4 +1,4 @@
-//! The 19 causes that `vsj diagnose` distinguishes: name, block, parameters, forms and how their size is measured.
+//! 19 of the 20 causes that `vsj diagnose` distinguishes, all but `stuck-sensor`: name, block, parameters, forms and how their size is measured.
 
 use std::fmt::{self, Display};
 

@@ -10,7 +10,7 @@
 //!
 //! | module | contents |
 //! | --- | --- |
-//! | [`cause`] | the 19 causes: names, blocks, parameters, forms |
+//! | [`cause`] | 19 causes, all but `stuck-sensor`: names, blocks, parameters, forms |
 //! | [`effect`], [`full_size`] | one cause with its values; random values of size 1 |
 //! | [`schedule`], [`noise`] | the commanded voltages; the noise on the readings |
 //! | [`physics`], [`hysteresis`] | the laws of the spring and their forms |

@@ -4,7 +4,7 @@
 //! cargo run --release -p validation --example cause_plots -- docs/causes
 //! ```
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use host_sim::output::diagnosis::panels::panels;
@@ -12,6 +12,7 @@ use identify::effects::model::Model;
 use identify::fit::simulator::Simulator;
 use identify::record::data::Data;
 use identify::{Input, Options};
+use simulation::record::Record;
 use validation::ground_truth::{Cause, Effect, LabelledRecord, Noise, Schedule};
 
 /// Values of the effect, in the order of [`Effect::values`], and a schedule in which it is visible.
@@ -39,6 +40,9 @@ fn shown(cause: Cause) -> (Vec<f64>, Schedule) {
     }
 }
 
+/// Times from and to which the sensor is stuck, in s.
+const STUCK_S: [f64; 2] = [52.0, 71.0];
+
 /// A stair up and down and one full step, 15 s each, ten rows per second.
 fn slow() -> Schedule {
     schedule(&[0.0, 125.0, 250.0, 375.0, 500.0, 375.0, 250.0, 125.0, 0.0, 500.0, 500.0, 0.0, 0.0], 15.0, 0.1)
@@ -58,18 +62,29 @@ fn schedule(levels_v: &[f64], hold_s: f64, every_s: f64) -> Schedule {
     }
 }
 
+/// Draws a record with the simulation.
+fn draw(path: &Path, record: &Record) -> anyhow::Result<()> {
+    let data = Data::new(record, Input::Hold);
+    let mut simulation = Vec::new();
+    Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulation);
+    std::fs::write(path, panels(&data, &simulation)).with_context(|| path.display().to_string())?;
+    println!("wrote {}", path.display());
+    Ok(())
+}
+
 fn main() -> anyhow::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).context("expected a folder to write to")?);
     for cause in Cause::ALL {
         let (values, schedule) = shown(cause);
         let effect = Effect { cause, form: 0, full_size: values.clone(), neutral: values, size: 1.0 };
         let record = LabelledRecord::new(schedule, vec![effect], Noise::white(0.1), 1);
-        let data = Data::new(&record.record(), Input::Hold);
-        let mut simulation = Vec::new();
-        Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulation);
-        let path = folder.join(format!("{cause}.svg"));
-        std::fs::write(&path, panels(&data, &simulation)).with_context(|| path.display().to_string())?;
-        println!("wrote {}", path.display());
+        draw(&folder.join(format!("{cause}.svg")), &record.record())?;
     }
-    Ok(())
+    // The simulator of the campaign has no stuck sensor: it is proved by equal readings, not by an effect of some size.
+    let mut stuck = LabelledRecord::new(slow(), Vec::new(), Noise::white(0.1), 1).record();
+    let from = stuck.rows.partition_point(|row| row.time_s < STUCK_S[0]);
+    let repeated = stuck.rows[from].measured;
+    let until_end = stuck.rows[from..].iter_mut().take_while(|row| row.time_s <= STUCK_S[1]);
+    until_end.for_each(|row| row.measured = repeated);
+    draw(&folder.join("stuck-sensor.svg"), &stuck)
 }

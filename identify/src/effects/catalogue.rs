@@ -4,7 +4,7 @@ use crate::effects::effect::Effect;
 use crate::effects::{
     amplifier_limit, amplifier_slew, charge_leakage, delay, drift, gain_error, hum, hysteresis, instantaneous_share,
     outliers, quantisation, reading_offset, resonance, second_relaxation, sensor_saturation, series_lag,
-    static_nonlinearity, time_constant, voltage_dependent_time_constant,
+    static_nonlinearity, stuck_sensor, time_constant, voltage_dependent_time_constant,
 };
 
 /// Every effect, in the order of the chain: each acts on the result of those before it.
@@ -27,6 +27,7 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &reading_offset::ReadingOffset,
     &sensor_saturation::SensorSaturation,
     &quantisation::Quantisation,
+    &stuck_sensor::StuckSensor,
     &outliers::Outliers,
 ];
 

@@ -32,6 +32,7 @@ mod second_relaxation;
 mod sensor_saturation;
 mod series_lag;
 mod static_nonlinearity;
+mod stuck_sensor;
 mod time_constant;
 mod voltage_dependent_time_constant;
 

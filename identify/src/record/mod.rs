@@ -8,6 +8,7 @@
 //! - *Clock*: one interval of which the times of all rows are multiples.
 //! - *Segment*: neighbouring rows that belong to the same fold.
 //! - *Quantisation grid*: equally spaced values to which the readings were rounded.
+//! - *Stuck sensor*: one that repeats a reading for a while.
 //! - *Censored reading*: one that stopped at a bound of the sensor.
 
 pub mod bounds;
@@ -27,3 +28,4 @@ pub mod quantisation_grid;
 pub mod scales;
 pub mod signal;
 pub mod spectrum;
+mod stuck;

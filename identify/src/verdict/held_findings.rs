@@ -23,7 +23,7 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
         dimension,
     };
     let percent = 100.0 * held.fraction;
-    let (cause, name, value, why) = match held.reason {
+    let (cause, parameters, why) = match held.reason {
         // What a sensor does as it should is no error of the simulation.
         Reason::SlowClock => return,
         Reason::ReportsChanges => {
@@ -31,8 +31,7 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
             let step = parameter(smallest, 0.0, middle, Dimension::ReadingSize);
             (
                 "quantisation",
-                "step",
-                step,
+                vec![("step", step)],
                 "they change by as much however long that takes: only changes are reported; in between, the response is near the last reading",
             )
         }
@@ -41,9 +40,17 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
             let late = parameter(age_s, age_s - Z * error_s, age_s + Z * error_s, Dimension::Time);
             (
                 "delay",
-                "delay_s",
-                late,
+                vec![("delay_s", late)],
                 "independently of the response: new readings are late or lost; the other readings alone are diagnosed",
+            )
+        }
+        Reason::Stuck => {
+            let [from_s, to_s] = held.longest_s.map(|time_s| parameter(time_s, time_s, time_s, Dimension::TimePoint));
+            let fraction = parameter(held.fraction, held.fraction, held.fraction, Dimension::Ratio);
+            (
+                "stuck-sensor",
+                vec![("from_s", from_s), ("to_s", to_s), ("fraction", fraction)],
+                "in runs that are far longer than all others: the sensor was stuck; the other readings alone are diagnosed",
             )
         }
     };
@@ -56,7 +63,7 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
     report.findings.push(Finding {
         cause,
         probability: 1.0,
-        parameters: vec![(name.to_owned(), value)],
+        parameters: parameters.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
         rmse_before: after.hypot(held.error),
         rmse_after: after,
         evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}"),

@@ -77,7 +77,7 @@ impl Cause {
         }
     }
 
-    /// Returns the cause code, as in the findings of `vsj diagnose`; `stuck-sensor` has none there.
+    /// Returns the cause code, as in the findings of `vsj diagnose`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::GainError => "gain-error",

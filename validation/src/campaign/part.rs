@@ -28,7 +28,7 @@ pub(super) fn seed(first: u64, part: u64, index: usize) -> u64 {
     first.wrapping_mul(1_000_000_007) + part * 100_000_000 + index as u64
 }
 
-/// `count` records of each of the 19 causes in its first form, 0.2 % white noise.
+/// `count` records of each of 19 causes in its first form, 0.2 % white noise.
 pub fn singles(first: u64, count: usize) -> Vec<Job> {
     each_cause(first, 1, count, &Cause::ALL, |recipe| recipe)
 }
