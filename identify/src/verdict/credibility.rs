@@ -5,13 +5,14 @@
 //! error a finding removes, compared with what such a law may leave, the less likely that is:
 //!
 //! ```text
-//! probability = 1 / (1 + exp(-odds)) * removed / (removed + UNKNOWN_FORM other + UNKNOWN_NOISE left)
+//! probability = 1 / (1 + exp(-odds)) * removed / (removed + min(UNKNOWN_FORM other, undetected left) + UNKNOWN_NOISE left)
 //! ```
 //!
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
 //! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and that
-//! is left but for outliers. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! is left but for outliers. A wrong form follows a law in part: where no structure is left that shows, it can have removed no more than
+//! [`undetected`] times what is left. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -22,7 +23,9 @@
 //! So do causes that are each likely, if the product of their probabilities is below [`LIKELY_TOGETHER`].
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
-use crate::stats::thresholds::empirical::{IF_IDENTIFIED, IF_SPOILING, IF_UNEXPLAINED, UNKNOWN_FORM, UNKNOWN_NOISE};
+use crate::stats::thresholds::empirical::{
+    IF_IDENTIFIED, IF_SPOILING, IF_UNEXPLAINED, ROWS_THAT_DETECT, UNKNOWN_FORM, UNKNOWN_NOISE,
+};
 use crate::verdict::extrapolation::Spoils;
 use crate::verdict::finding::explained;
 
@@ -41,9 +44,15 @@ const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series
 /// Causes that are linear dynamics of the spring, of which an identified one has its own.
 const LINEAR: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
 
+/// Returns the mean square error that a wrong form may remove of an unknown law without leaving structure that shows in a record of this
+/// many rows, relative to the mean square that is left; infinite if structure shows.
+pub(crate) fn undetected(rows: usize, is_structured: bool) -> f64 {
+    if is_structured { f64::INFINITY } else { (ROWS_THAT_DETECT.get() / rows as f64).max(1.0) }
+}
+
 /// Lowers probabilities by the chance that a law which no cause describes is behind a finding; `power` is the mean square of the readings
-/// about their mean, in the squared unit of the findings' errors.
-pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64) {
+/// about their mean, in the squared unit of the findings' errors, and `undetected` that of [`undetected`].
+pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64, undetected: f64) {
     let removed: Vec<f64> = findings.iter().map(|finding| explained(finding).max(0.0)).collect();
     let largest_but = |index: usize| {
         // What equality of readings proves follows no law that another cause could correct.
@@ -56,8 +65,10 @@ pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64) {
         let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
         // Outliers take no part in what a law may leave.
         let outliers = findings.iter().position(|other| other.cause == "outliers").filter(|other| *other != index);
-        let left = finding.rmse_after.powi(2) - outliers.map_or(0.0, |outliers| removed[outliers]);
-        let unknown = form + UNKNOWN_NOISE.get() * left.max(0.0);
+        let left = (finding.rmse_after.powi(2) - outliers.map_or(0.0, |outliers| removed[outliers])).max(0.0);
+        // Not the product of an infinity and 0.
+        let most = if left > 0.0 { undetected * left } else { f64::INFINITY };
+        let unknown = form.min(most) + UNKNOWN_NOISE.get() * left;
         if finding.proved { 1.0 } else { part(removed[index], unknown) }
     };
     let own: Vec<f64> = findings.iter().enumerate().map(own).collect();
@@ -188,30 +199,43 @@ mod tests {
     #[test]
     fn small_corrections_of_a_large_cause_are_less_likely_than_causes_of_their_own() {
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 1.3), finding("quantisation", 1.0)];
-        with_unknown_laws(&mut findings, f64::MAX);
+        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
         let [large, small, exact] = probabilities(&findings)[..] else { panic!() };
         // Some law is then unknown.
         assert!((0.9..0.95).contains(&large) && small < 0.3 && exact == 1.0, "{large} {small} {exact}");
         // A bound that the search found, in front of the noise, is proved by nothing.
         let mut findings = [finding("hysteresis", 20.0), finding("sensor-saturation", 1.3)];
-        with_unknown_laws(&mut findings, f64::MAX);
+        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
         assert!(probabilities(&findings)[1] < 0.3, "{findings:?}");
         let mut findings = [finding("hysteresis", 20.0), finding("resonance", 15.0), finding("hum", 4.0)];
-        with_unknown_laws(&mut findings, f64::MAX);
+        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
         assert!(probabilities(&findings).iter().all(|probability| *probability > 0.97), "{findings:?}");
         assert!(!are_unlikely(&findings) && !are_unlikely(&[]));
         let mut findings = [finding("resonance", 1.02), finding("quantisation", 1.0)];
-        with_unknown_laws(&mut findings, f64::MAX);
+        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
         assert!(are_unlikely(&findings), "{findings:?}");
+    }
+
+    #[test]
+    fn small_corrections_that_leave_noise_alone_are_likely() {
+        let second = |undetected: f64, before: f64| {
+            let mut findings = [finding("amplifier-limit", 100.0), finding("amplifier-slew", before)];
+            with_unknown_laws(&mut findings, f64::MAX, undetected);
+            probabilities(&findings)[1]
+        };
+        assert!(second(f64::INFINITY, 3.0) < 0.1 && second(1.0, 3.0) > 0.85 && second(1.0, 1.1) < 0.2);
+        // A few rows hide more, and structure is the sign of a form that is wrong.
+        assert_eq!([undetected(100_000, false), undetected(500, true)], [1.0, f64::INFINITY]);
+        assert!(second(undetected(100, false), 3.0) < 0.3);
     }
 
     /// The simulation was 1000 times too large.
     #[test]
     fn a_gain_that_is_far_off_leaves_other_causes_as_likely_as_one_of_the_readings_size() {
         let mut findings = [finding("gain-error", 1e5), finding("time-constant", 5.0)];
-        with_unknown_laws(&mut findings, 1e4);
+        with_unknown_laws(&mut findings, 1e4, f64::INFINITY);
         let mut close = [finding("gain-error", 100.0), finding("time-constant", 5.0)];
-        with_unknown_laws(&mut close, 1e4);
+        with_unknown_laws(&mut close, 1e4, f64::INFINITY);
         let [far, close] = [findings, close].map(|findings| probabilities(&findings)[1]);
         assert!((far - close).abs() < 0.01 && far > 0.1, "{far} {close}");
     }
@@ -220,13 +244,13 @@ mod tests {
     fn outliers_leave_other_causes_as_likely_as_they_are_without() {
         let alone = {
             let mut findings = [finding("time-constant", 1.5)];
-            with_unknown_laws(&mut findings, f64::MAX);
+            with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
             findings[0].probability
         };
         // The mean square error of the outliers is a part of what the time constant leaves.
         let beside = Finding { rmse_before: 401.25f64.sqrt(), rmse_after: 20.0, ..finding("time-constant", 1.5) };
         let mut findings = [beside, finding("outliers", 20.0)];
-        with_unknown_laws(&mut findings, f64::MAX);
+        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
         let probability = findings[0].probability;
         assert!((probability - alone).abs() < 0.01 && alone > 0.9, "{probability} {alone}");
     }

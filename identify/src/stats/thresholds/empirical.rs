@@ -222,6 +222,9 @@ thresholds! {
     WORSE_THAN_WITHOUT = 1.05, "errors without the cause";
     /// Mean square error that a law of unknown form may leave for a further cause.
     UNKNOWN_FORM = 0.01, "of the mean square that the largest other cause removes", set by "cargo campaign out-of-model";
+    /// Rows of a record in which a wrong form that removes as much of an unknown law as is left leaves structure that shows; of fewer
+    /// rows it removes more unseen, in inverse proportion.
+    ROWS_THAT_DETECT = 2000.0, "rows", set by "cargo campaign reliability";
     /// Mean square error that an unknown law may remove from the rest.
     UNKNOWN_NOISE = 0.1, "of the mean square that is left", set by "cargo campaign out-of-model";
     /// Largest probability of a cause in a record with the verdict `unexplained`.
