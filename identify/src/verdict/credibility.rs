@@ -12,7 +12,7 @@
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
 //! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and that
 //! is left but for outliers. A wrong form follows a law in part: where no structure is left that shows, it can have removed no more than
-//! [`undetected`] times what is left. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! [`undetected`] times what is left, or times `left / removed` as much if less than is left was removed. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -66,8 +66,8 @@ pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64, undetected
         // Outliers take no part in what a law may leave.
         let outliers = findings.iter().position(|other| other.cause == "outliers").filter(|other| *other != index);
         let left = (finding.rmse_after.powi(2) - outliers.map_or(0.0, |outliers| removed[outliers])).max(0.0);
-        // Not the product of an infinity and 0.
-        let most = if left > 0.0 { undetected * left } else { f64::INFINITY };
+        // What removes less than is left is nearer to what any form of a law leaves; not the product of an infinity and 0.
+        let most = if left > 0.0 { undetected * left * (left / removed[index]).max(1.0) } else { f64::INFINITY };
         let unknown = form.min(most) + UNKNOWN_NOISE.get() * left;
         if finding.proved { 1.0 } else { part(removed[index], unknown) }
     };
