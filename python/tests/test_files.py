@@ -29,6 +29,16 @@ def test_a_parquet_file_of_polars_is_the_record_that_its_csv_is(command, sample,
         assert tau_s(found) == pytest.approx(tau_s(expected), rel=1e-6)
 
 
+def test_typed_dates_are_the_days_of_typed_times(command, sample, tmp_path):
+    file, text = tmp_path / "sample.parquet", tmp_path / "sample.csv"
+    stamps = polars.datetime(2026, 1, 31, 23, 59) + polars.duration(milliseconds=polars.col("time_s") * 1000)
+    frame = polars.DataFrame(sample).with_columns(date=stamps.dt.date(), time=stamps.dt.time()).drop("time_s")
+    frame.write_parquet(file, compression="snappy")
+    frame.write_csv(text)
+    found, expected = (json.loads(command("identify", record, "--json")) for record in (file, text))
+    assert {**found, "start": None} == {**expected, "start": None}
+
+
 def test_polars_reads_what_the_command_writes(command, tmp_path):
     file = tmp_path / "stair.parquet"
     command("stair", "--out", file, "--every", "0.1")

@@ -119,6 +119,19 @@ fn texts_and_whole_numbers_can_be_times() {
 }
 
 #[test]
+fn the_days_of_times_are_in_a_column_of_dates() {
+    let columns = [Column::text("made"), Column::text("day"), Column::text("time"), RECORD[1], RECORD[2]];
+    let rows = [("2026-01-31", "23:59:59"), ("2026-02-02", "00:00:01"), ("2026-02-02", "00:00:02")]
+        .map(|(day, time)| [["2026-01-30", day, time].map(Cell::Text).to_vec(), vec![Cell::Number(1.0); 2]].concat());
+    for container in BOTH {
+        let found = parsed(container, bytes(container, &columns, &rows), &Format::default());
+        let times: Vec<f64> = found.record.rows.iter().map(|row| row.time_s).collect();
+        assert_eq!(times, [0.0, 86_402.0, 86_403.0], "{container:?}");
+        assert_eq!(found.remarks[1], "r: the days of the times are in column `day`");
+    }
+}
+
+#[test]
 fn every_damaged_file_is_an_error_in_one_line_or_a_remark() {
     for container in BOTH {
         let rows: Vec<_> = (0..50).map(|row| (f64::from(row), 1.0, 2.0)).collect();

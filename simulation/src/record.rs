@@ -10,6 +10,7 @@ mod times;
 
 pub use measured::{Format, MeasuredRecord, remarks_on};
 pub use names::{ColumnNames, with_unit};
+pub use times::is_like_date;
 
 use std::path::Path;
 

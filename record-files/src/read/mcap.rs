@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use simulation::bad_input;
 use simulation::csv_table::text::MOST_ROWS;
 use simulation::record::columns::{Column, too_many_rows};
-use simulation::record::{Format, with_unit};
+use simulation::record::{Format, is_like_date, with_unit};
 
 use super::messages::{Message, each_message};
 use super::{Cells, Columns};
@@ -26,6 +26,8 @@ type Path = Vec<String>;
 /// The fields of a topic's messages.
 struct Topic {
     fields: Vec<Path>,
+    /// The fields that are dates in the first message.
+    dates: Vec<Path>,
     /// Units of fields by the name of their column.
     units: BTreeMap<String, String>,
 }
@@ -53,7 +55,8 @@ pub(crate) fn columns(name: &str, bytes: &[u8], format: &Format, topic: Option<&
     let (topic, header, indices) = chosen(name, &topics, &others, format, topic)?;
     let fields = &topics[&topic].fields;
     let mut cells: Vec<(usize, Cells)> = Vec::new();
-    for index in indices {
+    let dates = (0..fields.len()).filter(|index| topics[&topic].dates.contains(&fields[*index]));
+    for index in indices.into_iter().chain(dates) {
         if !cells.iter().any(|(other, _)| *other == index) {
             cells.push((index, Cells::new()));
         }
@@ -136,6 +139,8 @@ impl Topic {
         let object = object(name, message)?;
         let (mut fields, mut units) = (Vec::new(), BTreeMap::new());
         collect(&object, &mut Vec::new(), &mut fields);
+        let is_date = |path: &&Path| at(&object, path).and_then(Value::as_str).is_some_and(is_like_date);
+        let dates = fields.iter().filter(is_date).cloned().collect();
         for path in &fields {
             if let Some(Value::Object(_)) = at(&object, path) {
                 units.insert(path.join("."), "s".to_owned());
@@ -153,7 +158,7 @@ impl Topic {
                 }
             });
         }
-        Ok(Self { fields, units })
+        Ok(Self { fields, dates, units })
     }
 
     /// Name of a field's column, with its unit.

@@ -1,4 +1,5 @@
-//! The columns of a file. Those that the record needs are read, of the others only the names.
+//! The columns of a file. Those that the record needs are read, and those of dates, which may be the days of its times; of the others
+//! only the names.
 
 mod arrow;
 mod caught;

@@ -1,11 +1,11 @@
-//! A Parquet file: its columns of numbers, time stamps and texts; lists are left out.
+//! A Parquet file: its columns of numbers, time stamps, dates, times of day and texts; lists are left out.
 //!
 //! Units are in the file's metadata, as `{"units": {"x": "mm"}}` under the key `PANDAS_ATTRS`, which pandas makes of
 //! `frame.attrs`, or as `{"x": "mm"}` under the key `units`; or they are in the names, as in CSV. Durations are read in s.
 
 use anyhow::Result;
 use bytes::Bytes;
-use chrono::{DateTime, SecondsFormat};
+use chrono::{DateTime, NaiveDate, NaiveTime, SecondsFormat, TimeDelta};
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 use simulation::BadInput;
 use simulation::csv_table::text::MOST_ROWS;
 use simulation::record::columns::{Column, too_many_rows};
-use simulation::record::{Format, with_unit};
+use simulation::record::{Format, is_like_date, with_unit};
 
 use super::caught::caught;
 use super::{Cells, Columns, arrow, pages};
@@ -53,10 +53,12 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     let needed = format.indices(name, names.iter().map(String::as_str))?;
     let mut columns = Vec::new();
     for (place, column) in names.into_iter().enumerate() {
-        let cells = if needed.contains(&place) {
-            let wrong = |what: String| BadInput(format!("{name}, column {column}: {what}"));
-            let per_second = durations.get(&schema.column(flat[place]).path().string()).copied();
-            cells(&reader, &bytes, flat[place], per_second).map_err(wrong)?
+        let per_second = durations.get(&schema.column(flat[place]).path().string()).copied();
+        let cells = |rows| cells(&reader, &bytes, flat[place], per_second, rows);
+        // What is neither needed nor readable has no dates.
+        let has_dates = || matches!(cells(1), Ok(Column::Texts(first)) if first.iter().any(|cell| is_like_date(cell)));
+        let cells = if needed.contains(&place) || has_dates() {
+            cells(usize::MAX).map_err(|what| BadInput(format!("{name}, column {column}: {what}")))?
         } else {
             Column::Unread
         };
@@ -92,19 +94,26 @@ enum Whole {
     Stamp { per_second: i64, is_utc: bool },
     /// A duration in parts of a second, which becomes one in s.
     Duration { per_second: i64 },
+    /// A time since midnight, in parts of a second.
+    TimeOfDay { per_second: i64 },
+    /// Days since 1970.
+    Date,
 }
 
 impl Whole {
-    /// `None` for a time of day or a date.
+    /// `None` for a type that is none of these.
     fn of(column: &ColumnDescriptor) -> Option<Self> {
         let number = |places, is_signed| Some(Self::Number { places, is_signed });
         let stamp = |per_second, is_utc| Some(Self::Stamp { per_second, is_utc });
+        let per_second = |unit: &TimeUnit| match unit {
+            TimeUnit::MILLIS => 1_000,
+            TimeUnit::MICROS => 1_000_000,
+            TimeUnit::NANOS => 1_000_000_000,
+        };
         match (column.logical_type_ref(), column.converted_type()) {
-            (Some(LogicalType::Timestamp(stamped)), _) => match stamped.unit {
-                TimeUnit::MILLIS => stamp(1_000, stamped.is_adjusted_to_u_t_c),
-                TimeUnit::MICROS => stamp(1_000_000, stamped.is_adjusted_to_u_t_c),
-                TimeUnit::NANOS => stamp(1_000_000_000, stamped.is_adjusted_to_u_t_c),
-            },
+            (Some(LogicalType::Timestamp(time)), _) => stamp(per_second(&time.unit), time.is_adjusted_to_u_t_c),
+            (Some(LogicalType::Time(time)), _) => Some(Self::TimeOfDay { per_second: per_second(&time.unit) }),
+            (Some(LogicalType::Date), _) => Some(Self::Date),
             (Some(LogicalType::Decimal(decimal)), _) => number(decimal.scale, true),
             (Some(LogicalType::Integer(integer)), _) => number(0, integer.is_signed),
             (Some(_), _) => None,
@@ -112,7 +121,9 @@ impl Whole {
             (None, ConvertedType::TIMESTAMP_MICROS) => stamp(1_000_000, true),
             (None, ConvertedType::DECIMAL) => number(column.type_scale(), true),
             (None, ConvertedType::UINT_32 | ConvertedType::UINT_64) => number(0, false),
-            (None, ConvertedType::DATE | ConvertedType::TIME_MILLIS | ConvertedType::TIME_MICROS) => None,
+            (None, ConvertedType::TIME_MILLIS) => Some(Self::TimeOfDay { per_second: 1_000 }),
+            (None, ConvertedType::TIME_MICROS) => Some(Self::TimeOfDay { per_second: 1_000_000 }),
+            (None, ConvertedType::DATE) => Some(Self::Date),
             (None, _) => number(0, true),
         }
     }
@@ -125,6 +136,8 @@ impl Whole {
             Self::Number { places, .. } => cells.number(value as f64 / 10f64.powi(places)),
             Self::Stamp { per_second, is_utc } => cells.text(stamp(value, per_second, is_utc)),
             Self::Duration { per_second } => cells.number(value as f64 / per_second as f64),
+            Self::TimeOfDay { per_second } => cells.text(time_of_day(value, per_second).unwrap_or_default()),
+            Self::Date => cells.text(date(value).map(|date| date.to_string()).unwrap_or_default()),
         }
     }
 }
@@ -137,12 +150,24 @@ fn stamp(value: i64, per_second: i64, is_utc: bool) -> String {
     if is_utc { text } else { text.trim_end_matches('Z').to_owned() }
 }
 
-/// The cells of a column, or what is wrong with it; `per_second` is given for one of durations.
+fn time_of_day(value: i64, per_second: i64) -> Option<String> {
+    let below_second = value.rem_euclid(per_second) * (1_000_000_000 / per_second);
+    let seconds = u32::try_from(value.div_euclid(per_second)).ok()?;
+    let time = NaiveTime::from_num_seconds_from_midnight_opt(seconds, u32::try_from(below_second).ok()?)?;
+    Some(time.format("%H:%M:%S%.9f").to_string())
+}
+
+fn date(days: i64) -> Option<NaiveDate> {
+    NaiveDate::default().checked_add_signed(TimeDelta::try_days(days)?)
+}
+
+/// The first `rows` cells of a column, or what is wrong with it; `per_second` is given for one of durations.
 fn cells(
     file: &SerializedFileReader<Bytes>,
     bytes: &[u8],
     index: usize,
     per_second: Option<i64>,
+    rows: usize,
 ) -> Result<Column, String> {
     let descriptor = file.metadata().file_metadata().schema_descr().column(index);
     let most = descriptor.max_def_level();
@@ -150,26 +175,29 @@ fn cells(
     let duration = per_second.map(|per_second| Whole::Duration { per_second });
     let whole = || duration.or_else(|| Whole::of(&descriptor)).ok_or_else(|| unsupported(&descriptor));
     for group in 0..file.num_row_groups() {
+        if cells.len() >= rows {
+            break;
+        }
         check_pages(file, bytes, group, index)?;
         let reader = file.get_row_group(group).and_then(|group| group.get_column_reader(index));
         let to = &mut cells;
         match reader.map_err(|error| unreadable(&error, to.len()))? {
-            ColumnReader::BoolColumnReader(reader) => each(reader, most, to, |it, to| to.whole((*it).into())),
+            ColumnReader::BoolColumnReader(reader) => each(reader, most, rows, to, |it, to| to.whole((*it).into())),
             ColumnReader::Int32ColumnReader(reader) => {
                 let whole = whole()?;
-                each(reader, most, to, |it, to| whole.add((*it).into(), (*it as u32).into(), to))
+                each(reader, most, rows, to, |it, to| whole.add((*it).into(), (*it as u32).into(), to))
             }
             ColumnReader::Int64ColumnReader(reader) => {
                 let whole = whole()?;
-                each(reader, most, to, |it, to| whole.add(*it, *it as u64, to))
+                each(reader, most, rows, to, |it, to| whole.add(*it, *it as u64, to))
             }
             ColumnReader::Int96ColumnReader(reader) => {
-                each(reader, most, to, |it, to| to.text(stamp(it.to_nanos(), 1_000_000_000, false)))
+                each(reader, most, rows, to, |it, to| to.text(stamp(it.to_nanos(), 1_000_000_000, false)))
             }
-            ColumnReader::FloatColumnReader(reader) => each(reader, most, to, |it, to| to.number((*it).into())),
-            ColumnReader::DoubleColumnReader(reader) => each(reader, most, to, |it, to| to.number(*it)),
+            ColumnReader::FloatColumnReader(reader) => each(reader, most, rows, to, |it, to| to.number((*it).into())),
+            ColumnReader::DoubleColumnReader(reader) => each(reader, most, rows, to, |it, to| to.number(*it)),
             ColumnReader::ByteArrayColumnReader(reader) if !is_decimal(&descriptor) => {
-                each(reader, most, to, |it, to| to.text(String::from_utf8_lossy(it.data()).into_owned()))
+                each(reader, most, rows, to, |it, to| to.text(String::from_utf8_lossy(it.data()).into_owned()))
             }
             _ => Err(unsupported(&descriptor)),
         }?;
@@ -197,7 +225,7 @@ fn unsupported(column: &ColumnDescriptor) -> String {
         (None, ConvertedType::NONE) => column.physical_type().to_string(),
         (None, converted) => converted.to_string(),
     };
-    format!("values of the type {kind}; expected numbers, time stamps or texts")
+    format!("values of the type {kind}; expected numbers, times, dates or texts")
 }
 
 /// What is wrong with a column that cannot be read further than a row.
@@ -210,10 +238,11 @@ fn unreadable(error: &ParquetError, row: usize) -> String {
     }
 }
 
-/// Adds every value of a column to `cells`, and a missing cell for each null.
+/// Adds every value of a column to `cells`, up to a number of `rows`, and a missing cell for each null.
 fn each<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     most: i16,
+    rows: usize,
     cells: &mut Cells,
     add: impl Fn(&T::T, &mut Cells),
 ) -> Result<(), String> {
@@ -222,7 +251,7 @@ fn each<T: DataType>(
         values.clear();
         levels.clear();
         let (records, ..) = reader
-            .read_records(BATCH, Some(&mut levels), None, &mut values)
+            .read_records(BATCH.min(rows - cells.len()), Some(&mut levels), None, &mut values)
             .map_err(|error| unreadable(&error, cells.len()))?;
         if records == 0 {
             return Ok(());

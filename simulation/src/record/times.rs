@@ -137,9 +137,7 @@ impl Clock {
 impl Dates {
     /// The columns of a record's first row that hold dates, without the column of times.
     fn of(row: &Row<'_>, time: usize) -> Self {
-        let is_like =
-            |text: &str| date(text).is_some() || text.split('/').filter(|part| is_digits(part, 1, 4)).count() == 3;
-        let cells = row.cells().enumerate().filter(|(index, text)| *index != time && is_like(text));
+        let cells = row.cells().enumerate().filter(|(index, text)| *index != time && is_like_date(text));
         Self { columns: cells.map(|(index, text)| (index, text.to_owned())).collect(), changed: None, days: 0 }
     }
 
@@ -261,6 +259,11 @@ fn is_date(text: &str) -> bool {
         parts.len() == 3 && parts.iter().zip(digits).all(|(part, (fewest, most))| is_digits(part, fewest, most))
     };
     has_parts('-', [(4, 4), (2, 2), (2, 2)]) || has_parts('.', [(1, 2), (1, 2), (4, 4)])
+}
+
+/// True for a cell that may hold the day of a time in another one, in any usual form.
+pub fn is_like_date(text: &str) -> bool {
+    date(text).is_some() || text.split('/').filter(|part| is_digits(part, 1, 4)).count() == 3
 }
 
 /// The date in a cell that holds nothing else, or midnight with it.
