@@ -406,6 +406,14 @@ fn rows_of_separators_are_blank_lines() {
 }
 
 #[test]
+fn rows_of_separators_above_the_header_are_blank_lines_too() {
+    for above in [";;\n", ";;\n\n # a\n;;\n", "a title;;\n;;\n"] {
+        let read = read(format!("{above}t_s;u_V;x_mm\n0;0;1\n1;0;2\n"), &Format::default());
+        assert_eq!(read.map(|read| read.record.rows.len()), Ok(2), "{above:?}");
+    }
+}
+
+#[test]
 fn a_header_in_a_comment_is_named() {
     let error = |text: &str| read(text, &Format::default()).unwrap_err();
     assert_eq!(

@@ -212,8 +212,13 @@ pub(super) fn has_thousands_separators(text: &str) -> bool {
         && digits.chars().all(|letter| letter.is_ascii_digit() || MARKS.contains(&letter))
 }
 
-/// True for a blank line, and for a comment that starts with `#`, `%` or `//`.
+/// True for a line of nothing but blanks and separators.
+pub(super) fn is_blank(line: &str) -> bool {
+    line.chars().all(|letter| letter.is_whitespace() || ",;|".contains(letter))
+}
+
+/// True for a line without content, and for a comment that starts with `#`, `%` or `//`.
 pub(super) fn is_above_header(line: &str) -> bool {
     let content = line.trim();
-    content.is_empty() || ["#", "%", "//"].iter().any(|mark| content.starts_with(mark))
+    is_blank(line) || ["#", "%", "//"].iter().any(|mark| content.starts_with(mark))
 }

@@ -1,6 +1,6 @@
 //! Which line of a text is the header of its table: instruments write titles above it, and units below.
 
-use super::dialect::{Numbers, Separator};
+use super::dialect::{Numbers, Separator, is_blank};
 use crate::units::is_unit;
 
 /// Number of rows below a header that have to agree with it.
@@ -75,8 +75,7 @@ pub(super) fn are_names(line: &str, separator: Separator, columns: usize) -> boo
 
 /// False for a comment, and for a line of nothing but blanks and separators.
 fn has_content(line: &str) -> bool {
-    let is_separator = |letter: char| letter.is_whitespace() || ",;|".contains(letter);
-    !line.starts_with('#') && !line.chars().all(is_separator)
+    !line.starts_with('#') && !is_blank(line)
 }
 
 /// The separator that is known, else the usual ones, as far as they split a line.
