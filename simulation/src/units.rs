@@ -84,6 +84,15 @@ pub(crate) fn is_unit(cell: &str) -> bool {
     is_usual(cell) || is_in('[', ']') || is_in('(', ')')
 }
 
+/// True for letters that number the channels of an instrument: `A`, `B` and so on in their order, cells without content left out. A
+/// single `A` is an ampere.
+pub(crate) fn are_labels<'t>(cells: impl Iterator<Item = &'t str>) -> bool {
+    let mut letters = 'A'..='Z';
+    let are_in_order =
+        cells.filter(|cell| !cell.is_empty()).all(|cell| letters.next().is_some_and(|it| cell.chars().eq([it])));
+    are_in_order && letters.start() > &'B'
+}
+
 impl Unit {
     fn of(name: &str, si: f64) -> Self {
         Self { name: name.into(), si }

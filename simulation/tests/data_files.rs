@@ -414,6 +414,35 @@ fn rows_of_separators_above_the_header_are_blank_lines_too() {
 }
 
 #[test]
+fn a_row_of_letters_in_their_order_labels_the_channels_and_is_no_row_of_units() {
+    let format =
+        Format { columns: ColumnNames { reading: Some("x".into()), ..ColumnNames::default() }, ..Format::default() };
+    let rows = "0;0;1\n1;0;2\n";
+    for (above, units, remarks) in [
+        ("t;u;x\n;A;B\n", ["s", "V", "units"], 3),
+        ("t;u;x\nA;B;C\n", ["s", "V", "units"], 3),
+        ("t;u;x\n;A;B\nms;V;mm\n", ["ms", "V", "mm"], 2),
+        (";A;B\nt;u;x\n", ["s", "V", "units"], 3),
+        ("A;B;C\nt;u;x\n", ["s", "V", "units"], 3),
+        // Ampere and newton.
+        ("t;u;x\n;A;N\n", ["s", "A", "N"], 2),
+        ("t;u;x\ns;A;\n", ["s", "A", "units"], 1),
+    ] {
+        let read = read(format!("{above}{rows}"), &format).unwrap();
+        let found = [&*read.units.time.name, &*read.units.voltage.name, &*read.units.reading];
+        assert_eq!((found, read.remarks.len()), (units, remarks), "{above:?}: {:?}", read.remarks);
+    }
+    let named = ColumnNames {
+        time: Some("A".into()),
+        voltage: Some("B".into()),
+        reading: Some("C".into()),
+        ..ColumnNames::default()
+    };
+    let read = read(format!("a title\nA;B;C\n{rows}"), &Format { columns: named, ..Format::default() });
+    assert_eq!(read.map(|read| read.record.rows.len()), Ok(2), "letters are names where there are no others");
+}
+
+#[test]
 fn a_header_in_a_comment_is_named() {
     let error = |text: &str| read(text, &Format::default()).unwrap_err();
     assert_eq!(

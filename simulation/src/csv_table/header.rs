@@ -1,7 +1,7 @@
 //! Which line of a text is the header of its table: instruments write titles above it, and units below.
 
 use super::dialect::{Numbers, Separator, is_blank};
-use crate::units::is_unit;
+use crate::units::{are_labels, is_unit};
 
 /// Number of rows below a header that have to agree with it.
 pub(super) const CHECKED_ROWS: usize = 10;
@@ -16,8 +16,8 @@ pub(super) struct Candidate {
 }
 
 /// Returns the lines of a text that can be its header, among the first `most` that are neither blank nor comments: lines of
-/// names without numbers, whose number of columns is that of the next rows of numbers, behind at most one line of units. Of
-/// two such lines of names above the same rows, both.
+/// names without numbers, whose number of columns is that of the next rows of numbers, behind at most one line of labels and
+/// one of units. Of two such lines of names above the same rows, both.
 pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> Vec<Candidate> {
     let starts = text.split_inclusive('\n').scan(0, |next, line| {
         let start = *next;
@@ -34,7 +34,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
         // A row of numbers can look like names to another separator: `high<tab>0,5<tab>0,7` to the comma.
         table = table.filter(|(columns, separator)| {
             let cells = Cells::of(line, *separator);
-            cells.are_row(*columns) || cells.are_units_of(*columns)
+            cells.are_row(*columns) || cells.are_units_of(*columns) || cells.have_labels()
         });
         if table.is_some() {
             continue;
@@ -44,7 +44,9 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
         };
         let header = Cells::of(line, separator);
         if let Some((start, above)) = index.checked_sub(1).map(|index| lines[index])
-            && Cells::of(above, separator).are_names(header.used)
+            && let above = Cells::of(above, separator)
+            && above.are_names(header.used)
+            && !above.have_labels()
         {
             found.push(Candidate { start, separator });
         }
@@ -87,12 +89,12 @@ fn separators(known: Option<Separator>, line: &str) -> impl Iterator<Item = Sepa
 }
 
 /// True for a line of names above as many columns of numbers.
-fn is_header<'t>(line: &str, mut below: impl Iterator<Item = &'t str> + Clone, separator: Separator) -> bool {
+fn is_header<'t>(line: &str, below: impl Iterator<Item = &'t str>, separator: Separator) -> bool {
     let header = Cells::of(line, separator);
     let columns = header.used;
-    if below.clone().next().is_some_and(|line| Cells::of(line, separator).are_units_of(columns)) {
-        below.next();
-    }
+    let mut below = below.peekable();
+    below.next_if(|line| Cells::of(line, separator).have_labels());
+    below.next_if(|line| Cells::of(line, separator).are_units_of(columns));
     let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();
     header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.are_row(columns))
 }
@@ -142,11 +144,15 @@ impl<'t> Cells<'t> {
         self.fit(columns) && self.are_units()
     }
 
-    /// True if at least half of the cells that say something are units, and none is a number.
+    fn have_labels(&self) -> bool {
+        are_labels(self.cells.iter().copied())
+    }
+
+    /// True if at least half of the cells that say something are units, and none is a number; false for labels.
     fn are_units(&self) -> bool {
         let said = self.cells.iter().filter(|cell| !["", "-"].contains(cell));
         let units = said.clone().filter(|cell| is_unit(cell)).count();
-        units > 0 && 2 * units >= said.count() && !self.have_numbers()
+        units > 0 && 2 * units >= said.count() && !self.have_numbers() && !self.have_labels()
     }
 }
 

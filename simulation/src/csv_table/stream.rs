@@ -101,12 +101,12 @@ impl<'a> Stream<'a> {
     /// Reads the lines of text between the comments and the header; returns the separator of the columns, and the number of the
     /// header's line if it is not the first one. Where no line can be the header, the first one is.
     pub(super) fn skip_titles(&mut self, known: Option<Separator>) -> Result<(Separator, Option<usize>), BadInput> {
-        // What is read ahead remains in memory: only a file with titles needs more than a header, units and rows.
-        let head = self.head(2 + CHECKED_ROWS)?;
+        // What is read ahead remains in memory: only a file with titles needs more than a header, labels, units and rows.
+        let head = self.head(3 + CHECKED_ROWS)?;
         if let [first] = *header::candidates(head, known, 1) {
             return Ok((first.separator, None));
         }
-        let head = self.head(MOST_TITLES + 2 + CHECKED_ROWS)?;
+        let head = self.head(MOST_TITLES + 3 + CHECKED_ROWS)?;
         match *header::candidates(head, known, MOST_TITLES + 1) {
             [] => Ok((header::separator(head, known), None)),
             [only] => {

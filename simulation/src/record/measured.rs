@@ -14,7 +14,7 @@ use crate::bad_input::{BadInput, excerpt, number};
 use crate::csv_table::dialect::{Decimal, Dialect, Separator};
 use crate::csv_table::text::Source;
 use crate::csv_table::{Numbering, Table};
-use crate::units::{Unit, Units, usual_volts};
+use crate::units::{Unit, Units, are_labels, usual_volts};
 
 /// How to read a file with a measured record; everything that is not said is found in the file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -142,6 +142,7 @@ impl Format {
         };
         let mut table = Table::read(source, dialect)?;
         let columns = self.columns.find(&table)?;
+        let has_labels = skip_labels(&mut table)?;
         let below_header = below_header(&mut table, &columns)?;
         let units = self.units(&columns, &below_header)?;
         let mut rows =
@@ -149,6 +150,9 @@ impl Format {
         let mut timed = rows.read()?;
         let (has_stamps, dates) = (rows.clock.has_stamps(), rows.clock.dates());
         let mut remarks: Vec<String> = table.remarks().collect();
+        if has_labels {
+            remarks.push(format!("{name}: letters of channels below the header, skipped"));
+        }
         if below_header.iter().any(Option::is_some) {
             let shown = below_header.each_ref().map(|unit| unit.as_deref().unwrap_or("-"));
             remarks.push(format!("{name}: units {} below the header", shown.join(", ")));
@@ -238,7 +242,17 @@ impl Format {
     }
 }
 
-/// The units of time, voltage and reading in the first row below the header, if it is a row of units; any other one is still to
+/// Skips a row that labels channels with letters; returns false if the next row is another one.
+fn skip_labels(table: &mut Table<'_>) -> Result<bool> {
+    let Some(row) = table.next_row()? else { return Ok(false) };
+    let has_labels = are_labels(row.cells());
+    if !has_labels {
+        table.return_row();
+    }
+    Ok(has_labels)
+}
+
+/// The units of time, voltage and reading in the next row below the header, if it is a row of units; any other one is still to
 /// be read. Above time stamps a unit of time says nothing.
 ///
 /// # Errors
