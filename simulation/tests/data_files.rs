@@ -576,6 +576,13 @@ fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
     let stopwatch = "Date;Time;u_V;x_mm\n2026-01-31;0:00:01;0;1\n2026-02-01;0:00:02;0;1\n";
     let error = read(stopwatch, &Format::default()).unwrap_err();
     assert!(error.contains("line 3, column Time: `0:00:02` follows a smaller time while the date changes"), "{error}");
+    let late = "Date;Time;u_V;x_mm\n2026-01-31;0:05:01;0;1\n2026-01-31;0:05:02;0;1\n2026-02-01;0:05:03;0;1\n";
+    let error = read(late, &Format::default()).unwrap_err();
+    assert!(error.contains("line 4, column Time: `0:05:03` follows a smaller time while the date changes"), "{error}");
+    let after_a_day = late.replace("0:05:03", "0:05:13");
+    assert_eq!(times(&after_a_day).0, [0.0, 1.0, 86_412.0]);
+    let daily = "Date;Time;u_V;x_mm\n2026-01-31;12:00:01;0;1\n2026-02-01;12:00:02;0;1\n2026-02-02;12:00:03;0;1\n";
+    assert_eq!(times(daily).0, [0.0, 86_401.0, 172_802.0]);
     // The difference is a nanosecond; doubles of this size are 256 apart.
     let epoch = "t_ns,u_V,x_mm\n1767225600123456789,0,1\n1767225600123456790,0,1\n";
     assert_eq!(times(epoch), (vec![0.0, 1e-9], "ns".to_owned(), from_first));

@@ -37,6 +37,8 @@ pub(super) struct Clock {
     first: Option<First>,
     /// The last time of day, in ns since the first midnight.
     last: i128,
+    /// Time from the row before the last one to the last one, in ns.
+    last_step: i128,
     /// True once a time has 24 h or more: those of a stopwatch, which do not begin again after midnight.
     is_stopwatch: bool,
     dates: Dates,
@@ -77,8 +79,11 @@ impl Clock {
     pub(super) fn read(&mut self, row: &Row<'_>, column: usize) -> Result<Time> {
         let text = row.text(column);
         let stamp = Stamp::parse(text);
-        if self.first.is_none() && stamp.is_some_and(|stamp| stamp.form == Form::TimeOfDay) {
+        if self.first.is_none()
+            && let Some(stamp) = stamp.filter(|stamp| stamp.form == Form::TimeOfDay)
+        {
             self.dates = Dates::of(row, column);
+            self.last = stamp.nanoseconds;
         }
         let first = *self.first.get_or_insert(match stamp {
             Some(stamp) => First::Stamp(stamp),
@@ -102,7 +107,10 @@ impl Clock {
                     let wraps = self.last - stamp.nanoseconds >= DAY_NS / 2;
                     let days = if self.is_stopwatch { None } else { self.dates.days(row, wraps)? };
                     if let Some(days) = days {
-                        if !had_changed && first.nanoseconds < MINUTE_NS && stamp.nanoseconds > self.last {
+                        let step = stamp.nanoseconds - self.last;
+                        // A clock would have been silent for a day, and then gone on as if it had not.
+                        let goes_on = step <= 2 * self.last_step;
+                        if !had_changed && step > 0 && (first.nanoseconds < MINUTE_NS || goes_on) {
                             bad_input!(
                                 "{}: `{text}` follows a smaller time while the date changes, as a stopwatch does; expected times of day, or \
                                  time stamps such as 2026-01-31T23:59:58.5",
@@ -114,6 +122,7 @@ impl Clock {
                         // After midnight a clock begins again: a time that is earlier by 12 h or more is one of the next day.
                         stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
                     }
+                    self.last_step = stamp.nanoseconds - self.last;
                     self.last = stamp.nanoseconds;
                 }
                 let since_first = stamp.since(first);
