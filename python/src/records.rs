@@ -6,9 +6,9 @@ use anyhow::Result;
 use identify::Input;
 use pyo3::prelude::*;
 use simulation::bad_input;
+use simulation::csv_table::Numbering;
 use simulation::csv_table::dialect::{Dialect, Separator};
-use simulation::csv_table::text::Source;
-use simulation::record::columns::{self, Column};
+use simulation::record::columns::Column;
 use simulation::record::{ColumnNames, Format, MeasuredRecord, Record, columns_file, remarks_on};
 
 use crate::table::Cells;
@@ -69,7 +69,7 @@ impl Options {
                 let mut format = format.clone();
                 format.dialect.separator = Some(Separator::COMMA);
                 format.dialect.decimal = format.dialect.decimal.filter(|_| columns.iter().any(has_decimal_commas));
-                format.read(Source::new(name, columns::text(name, columns)?))
+                format.read_columns(name, columns, Numbering::Lines)
             }
         };
         let measured: Vec<MeasuredRecord> = records.iter().map(read).collect::<Result<_>>()?;

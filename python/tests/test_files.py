@@ -1,6 +1,7 @@
 """Parquet files of the command and of others."""
 
 import json
+import re
 
 import polars
 import pytest
@@ -27,6 +28,10 @@ def test_a_parquet_file_of_polars_is_the_record_that_its_csv_is(command, sample,
         elapsed.drop("time_s").write_parquet(file, compression="snappy")
         found = json.loads(command("identify", file, "--json"))
         assert tau_s(found) == pytest.approx(tau_s(expected), rel=1e-6)
+    expected = "column time [s]: durations, not numbers in ms; expected numbers, or no unit"
+    assert expected in command.error("identify", file, "--time", "time:ms")
+    with pytest.raises(vsj.BadInput, match=re.escape(expected)):
+        vsj.identify(polars.read_parquet(file), time="time:ms")
 
 
 def test_typed_dates_are_the_days_of_typed_times(command, sample, tmp_path):

@@ -139,7 +139,7 @@ def _cells(array):
     if kind == "M":
         return np.datetime_as_string(array, unit="ns").tolist()
     if kind == "m":
-        return array / np.timedelta64(1, "s")
+        return array.astype("m8[ns]")
     # Times in ns since 1970 have more digits than a double.
     if kind in "iu" and array.size and max(abs(int(array.min())), abs(int(array.max()))) > 2**53:
         return array.astype(str).tolist()

@@ -17,9 +17,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use simulation::bad_input;
+use simulation::csv_table::Numbering;
 use simulation::csv_table::dialect::Dialect;
 use simulation::csv_table::text::{MOST_BYTES, Source};
-use simulation::record::{Format, MeasuredRecord, columns};
+use simulation::record::{Format, MeasuredRecord};
 
 pub use write::{Cell, Column, Kind, Sheet, Writer};
 
@@ -124,7 +125,7 @@ pub fn read(
         Container::Mcap => read::mcap::columns(name, &bytes, format, topic)?,
         Container::Parquet => read::parquet::columns(name, bytes, format)?,
     };
-    let mut measured = format.read(Source::of_rows(name, columns::text(name, &columns)?))?;
+    let mut measured = format.read_columns(name, &columns, Numbering::Rows)?;
     measured.remarks.splice(0..0, remarks);
     Ok(measured)
 }

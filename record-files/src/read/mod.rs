@@ -30,7 +30,7 @@ impl Cells {
 
     fn len(&self) -> usize {
         match &self.0 {
-            Column::Numbers(numbers) => numbers.len(),
+            Column::Numbers(numbers) | Column::Durations(numbers) => numbers.len(),
             Column::Texts(texts) => texts.len(),
             Column::Unread => 0,
         }
@@ -38,7 +38,7 @@ impl Cells {
 
     fn number(&mut self, value: f64) {
         match &mut self.0 {
-            Column::Numbers(numbers) => numbers.push(value),
+            Column::Numbers(numbers) | Column::Durations(numbers) => numbers.push(value),
             Column::Texts(texts) => texts.push(format!("{value:?}")),
             Column::Unread => (),
         }
@@ -53,7 +53,7 @@ impl Cells {
     }
 
     fn text(&mut self, text: String) {
-        if let Column::Numbers(numbers) = &self.0 {
+        if let Column::Numbers(numbers) | Column::Durations(numbers) = &self.0 {
             self.0 = Column::Texts(numbers.iter().map(|number| format!("{number:?}")).collect());
         }
         if let Column::Texts(texts) = &mut self.0 {

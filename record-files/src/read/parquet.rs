@@ -171,7 +171,8 @@ fn cells(
 ) -> Result<Column, String> {
     let descriptor = file.metadata().file_metadata().schema_descr().column(index);
     let most = descriptor.max_def_level();
-    let mut cells = Cells::new();
+    let empty = if per_second.is_some() { Column::Durations } else { Column::Numbers };
+    let mut cells = Cells(empty(Vec::new()));
     let duration = per_second.map(|per_second| Whole::Duration { per_second });
     let whole = || duration.or_else(|| Whole::of(&descriptor)).ok_or_else(|| unsupported(&descriptor));
     for group in 0..file.num_row_groups() {

@@ -47,9 +47,9 @@ impl<'a> Source<'a> {
         Self::read(name, Cursor::new(bytes.into()))
     }
 
-    /// Wraps the text of [`crate::record::columns::text`], made of a file that has rows and no lines.
-    pub fn of_rows(name: &str, text: String) -> Self {
-        Self { numbering: Numbering::Rows, ..Self::new(name, text) }
+    /// Wraps the text of columns whose rows are numbered in this way.
+    pub(crate) fn of_columns(name: &str, text: String, numbering: Numbering) -> Self {
+        Self { numbering, ..Self::new(name, text) }
     }
 
     /// The same source, in which any encoding but UTF-8 is an error.

@@ -15,6 +15,8 @@ use crate::csv_table::text::MOST_ROWS;
 pub enum Column {
     /// Numbers; NaN is a missing reading.
     Numbers(Vec<f64>),
+    /// Durations in s; NaN is a missing one.
+    Durations(Vec<f64>),
     /// Texts, such as time stamps, or whole numbers with more digits than a double.
     Texts(Vec<String>),
     /// A column whose cells nobody reads, of any length.
@@ -25,7 +27,7 @@ impl Column {
     /// Number of rows, `None` if nobody reads them.
     fn rows(&self) -> Option<usize> {
         match self {
-            Self::Numbers(numbers) => Some(numbers.len()),
+            Self::Numbers(numbers) | Self::Durations(numbers) => Some(numbers.len()),
             Self::Texts(texts) => Some(texts.len()),
             Self::Unread => None,
         }
@@ -34,7 +36,9 @@ impl Column {
     fn write(&self, row: usize, text: &mut String) {
         match self {
             // Shortest digits that are read as the same number.
-            Self::Numbers(numbers) => write!(text, "{:?}", numbers[row]).expect("a String takes all"),
+            Self::Numbers(numbers) | Self::Durations(numbers) => {
+                write!(text, "{:?}", numbers[row]).expect("a String takes all")
+            }
             Self::Texts(texts) => quote(&texts[row], text),
             Self::Unread => (),
         }
@@ -65,7 +69,7 @@ pub(super) fn header<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
 ///
 /// # Errors
 /// [`crate::BadInput`] for columns of different lengths and for more than a million rows.
-pub fn text(name: &str, columns: &[(String, Column)]) -> Result<String> {
+pub(super) fn text(name: &str, columns: &[(String, Column)]) -> Result<String> {
     let lengths = columns.iter().filter_map(|(column, cells)| Some((column, cells.rows()?)));
     let (first, rows) = lengths.clone().next().map_or((None, 0), |(column, rows)| (Some(column), rows));
     for (column, found) in lengths {

@@ -126,8 +126,31 @@ impl Format {
     pub fn indices<'a>(&self, name: &str, columns: impl IntoIterator<Item = &'a str>) -> Result<[usize; 3]> {
         let header = columns::header(columns);
         let dialect = Dialect { separator: Some(Separator::COMMA), ..self.dialect };
-        let columns = self.columns.find(&Table::read(Source::of_rows(name, header), dialect)?)?;
+        let columns = self.columns.find(&Table::read(Source::of_columns(name, header, Numbering::Rows), dialect)?)?;
         Ok([columns.time, columns.voltage, columns.reading].map(|column| column.index))
+    }
+
+    /// Reads a record from columns in memory; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// The errors of [`Format::open`], and [`BadInput`] for durations that the format takes for numbers in another unit than s.
+    pub fn read_columns(
+        &self,
+        name: &str,
+        columns: &[(String, columns::Column)],
+        numbering: Numbering,
+    ) -> Result<MeasuredRecord> {
+        let measured = self.read(Source::of_columns(name, columns::text(name, columns)?, numbering))?;
+        let indices = self.indices(name, columns.iter().map(|(column, _)| column.as_str()))?;
+        let Units { time, voltage, reading } = &measured.units;
+        for (index, unit) in indices.into_iter().zip([&time.name, &voltage.name, reading]) {
+            let (column, cells) = &columns[index];
+            if matches!(cells, columns::Column::Durations(_)) && unit != "s" {
+                let column = excerpt(column).replace(['\n', '\r'], " ");
+                bad_input!("{name}, column {column}: durations, not numbers in {unit}; expected numbers, or no unit");
+            }
+        }
+        Ok(measured)
     }
 
     /// Reads a record from the bytes of a file.
