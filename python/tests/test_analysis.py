@@ -282,6 +282,12 @@ def test_units_of_a_frame_are_those_of_the_command(command, sample, tmp_path):
         found = vsj.identify(data)
         assert without_names(found.to_json()) == {**expected, "start": without_names(json.dumps(expected))["start"]}
         assert found.unit == "mm"
+    table = pyarrow.parquet.read_table(file)
+    for keys in (("units", "PANDAS_ATTRS"), ("PANDAS_ATTRS", "units")):
+        units = {"units": {"x": "um", "note": "V"}, "PANDAS_ATTRS": {"units": frame.attrs["units"]}}
+        both = table.replace_schema_metadata({key: json.dumps(units[key]) for key in keys})
+        pyarrow.parquet.write_table(both, file)
+        assert json.loads(command("identify", file, "--json"))["unit"] == vsj.identify(both).unit == "mm", keys
 
 
 def test_durations_are_in_s_whatever_the_name_says(sample):

@@ -10,6 +10,7 @@ use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use serde_json::{Map, Value};
@@ -41,7 +42,7 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     let of_arrow = pairs().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
     let schema = metadata.schema_descr();
     let durations = of_arrow.map(|text| arrow::durations(text, schema.num_columns())).unwrap_or_default();
-    let units = units(pairs());
+    let units = units(pairs);
     let flat = (0..schema.num_columns()).filter(|index| schema.column(*index).max_rep_level() == 0);
     let flat: Vec<usize> = flat.collect();
     let named = |index: &usize| {
@@ -67,20 +68,16 @@ fn read(name: &str, bytes: Vec<u8>, format: &Format) -> Result<Columns> {
     Ok(Columns { columns, remarks: Vec::new() })
 }
 
-/// Units of columns by name, from the file's metadata.
-fn units<'a>(pairs: impl Iterator<Item = &'a parquet::file::metadata::KeyValue>) -> Map<String, Value> {
-    let mut units = Map::new();
-    for pair in pairs {
-        let value = pair.value.as_deref().and_then(|text| serde_json::from_str::<Value>(text).ok());
-        let found = match (pair.key.as_str(), value) {
-            ("units", Some(Value::Object(units))) => Some(units),
-            ("PANDAS_ATTRS", Some(Value::Object(mut attributes))) => match attributes.remove("units") {
-                Some(Value::Object(units)) => Some(units),
-                _ => None,
-            },
-            _ => None,
-        };
-        units.extend(found.into_iter().flatten());
+/// Units of columns by name, from the file's metadata; of two, that of pandas, which is the one of the frame.
+fn units<'a, P: Iterator<Item = &'a KeyValue>>(pairs: impl Fn() -> P) -> Map<String, Value> {
+    let object = |key: &str| {
+        let text = pairs().find(|pair| pair.key == key)?.value.as_deref()?;
+        serde_json::from_str::<Map<String, Value>>(text).ok()
+    };
+    let mut units = object("units").unwrap_or_default();
+    if let Some(Value::Object(of_frame)) = object("PANDAS_ATTRS").and_then(|mut attributes| attributes.remove("units"))
+    {
+        units.extend(of_frame);
     }
     units
 }
