@@ -64,7 +64,7 @@ def test_plan_equals_the_command(command, diagnosis, tmp_path):
     plan = vsj.plan(diagnosis, minutes=2)
     assert json.loads(plan.to_json()) == expected
     every_field_is_there(plan, expected)
-    assert plan.plot().axes[0].lines
+    assert plan.plot().axes[0].lines and plan.plot(pyplot.subplots(squeeze=False)[1]).axes[0].lines
     command("plan", file, "--minutes", 2, "--out", tmp_path / "plan")
     schedule = pandas.read_csv(tmp_path / "plan/schedule.csv", comment="#")
     np.testing.assert_allclose(plan.to_frame()[["time_s", "voltage_v"]], schedule[["time_s", "voltage_v"]], atol=1e-6)
@@ -269,6 +269,8 @@ def test_figures_are_drawn(diagnosis):
     for answer in (found, diagnosis, vsj.Controller().run(np.full(100, 200.0))):
         figure = answer.plot()
         assert figure.axes and figure.axes[0].lines
+        _, axes = pyplot.subplots(2, 1, squeeze=False)
+        assert answer.plot(axes) is axes[0, 0].figure and all(axis.lines for axis in axes.flat)
     assert set(found.to_frame()["quantity"]) >= {"gain", "zero", "share", "delay_s", "tau_s[0]", "weight[0]"}
 
 

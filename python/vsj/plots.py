@@ -1,5 +1,7 @@
 """Figures. matplotlib is imported when the first one is drawn."""
 
+import numpy as np
+
 from .records import bad_input
 
 
@@ -47,7 +49,7 @@ def run(ticks, axes=None):
 
 def _figure(axes, rows):
     if axes is not None:
-        axes = list(axes) if hasattr(axes, "__len__") else [axes]
+        axes = list(np.ravel(axes))
         if len(axes) != rows or not all(hasattr(it, "figure") for it in axes):
             raise bad_input(f"axes: {len(axes)}; expected {rows} matplotlib Axes, one above the other, or none")
         return axes[0].figure, axes
