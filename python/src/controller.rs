@@ -167,6 +167,16 @@ impl Controller {
         Ok(Self { inner, has_sensor, not_simulated, remarks })
     }
 
+    /// Another controller in the same state.
+    fn copied(&self) -> Self {
+        Self {
+            inner: self.inner.clone(),
+            has_sensor: self.has_sensor,
+            not_simulated: self.not_simulated.clone(),
+            remarks: self.remarks.clone(),
+        }
+    }
+
     /// Forgets everything: the spring is at rest at 0 V.
     fn reset(&mut self) {
         self.inner.reset();

@@ -1,5 +1,7 @@
 """The tick compared with the command's, bit for bit."""
 
+import copy
+import pickle
 import threading
 import time
 
@@ -130,6 +132,21 @@ def test_times_of_a_simulation_may_be_stamps_and_durations():
     stamps = np.array(["2026-01-31T00:00:05", "2026-01-31T00:00:06", "2026-01-31T00:00:07.5"], "M8[ms]")
     for times in (stamps, stamps - stamps[0], pandas.DatetimeIndex(stamps), pandas.Series(stamps).astype("M8[ns]")):
         np.testing.assert_array_equal(vsj.simulate("paper", times, [0.0, 300.0, 300.0]), expected)
+
+
+def test_a_copy_has_the_state_and_a_pickle_is_refused(hysteretic):
+    sensor = dict(feedback=vsj.Feedback(), controller="robust")
+    for original in (vsj.Controller(), vsj.Controller(hysteretic, **sensor)):
+        targets = np.repeat([200.0, 400.0], 300)
+        original.run(targets)
+        copies = [copy.copy(original), copy.deepcopy(original)]
+        expected = original.run(targets)
+        for it in copies:
+            assert it.range_v == original.range_v and it.run(targets[:100]).time_s[-1] == expected.time_s[99]
+        for it in copies:
+            np.testing.assert_array_equal(it.run(targets[100:]).code, expected.code[100:])
+        with pytest.raises(TypeError, match="expected its arguments, from which each process makes its own"):
+            pickle.dumps(original)
 
 
 def test_what_a_mask_hides_is_missing():

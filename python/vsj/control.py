@@ -145,6 +145,18 @@ class Controller:
         warn_of(self._inner.not_simulated)
         warn(self._inner.remarks)
 
+    def __copy__(self):
+        """A controller in the same state, which then has one of its own."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, _inner=self._inner.copied())
+        return other
+
+    def __deepcopy__(self, memo):
+        return self.__copy__()
+
+    def __reduce__(self):
+        raise TypeError("the state of a Controller cannot be pickled; expected its arguments, from which each process makes its own")
+
     @property
     def range_v(self) -> Tuple[float, float]:
         """Lowest and highest voltage that is put out, in V."""
