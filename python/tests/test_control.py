@@ -183,6 +183,8 @@ def test_a_computation_that_would_not_end_is_refused():
         (lambda: vsj.Controller(controller=3), "controller: 3; expected a text"),
         (lambda: vsj.Controller(limit_v="high"), "limit_v: 'high'; expected a number"),
         (lambda: vsj.Controller(feedback={}), "feedback: dict; expected vsj.Feedback"),
+        (lambda: vsj.Controller(controller="robust", overshoot_percent="2 %"), "overshoot_percent: '2 %'; expected a number"),
+        (lambda: vsj.Controller(controller="robust", known={"tau": "5 %"}), r"known\['tau'\]: '5 %'; expected a number"),
         (lambda: vsj.Controller(controller="robust", known=[5]), "known: list; expected a mapping"),
         (lambda: vsj.Controller(None), "plant: NoneType; expected paper, a plant file, or an answer"),
         (lambda: vsj.Controller(vsj.Spring()), "plant: Spring; expected paper"),

@@ -236,8 +236,8 @@ def margin(
     unknown = set(known) - {"tau", "share", "gain"}
     if unknown:
         raise _vsj.BadInput(f"known: {', '.join(sorted(map(str, unknown)))}; expected tau, share or gain")
-    parts = [known.get("tau", 0.0), known.get("share", 0.0), known.get("gain", 0.0), overshoot_percent]
-    return [number("known", part) / 100.0 for part in parts]
+    parts = [number(f"known[{key!r}]", known.get(key, 0.0)) for key in ("tau", "share", "gain")]
+    return [part / 100.0 for part in (*parts, number("overshoot_percent", overshoot_percent))]
 
 
 def vector(values, name):
