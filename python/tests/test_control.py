@@ -4,6 +4,7 @@ import copy
 import pickle
 import threading
 import time
+from datetime import timedelta, timezone
 
 import numpy as np
 import pandas
@@ -132,6 +133,12 @@ def test_times_of_a_simulation_may_be_stamps_and_durations():
     stamps = np.array(["2026-01-31T00:00:05", "2026-01-31T00:00:06", "2026-01-31T00:00:07.5"], "M8[ms]")
     for times in (stamps, stamps - stamps[0], pandas.DatetimeIndex(stamps), pandas.Series(stamps).astype("M8[ns]")):
         np.testing.assert_array_equal(vsj.simulate("paper", times, [0.0, 300.0, 300.0]), expected)
+    naive = stamps.astype("M8[us]").tolist()
+    in_zones = [naive[0].replace(tzinfo=timezone(timedelta(hours=1))), *(it.replace(tzinfo=timezone.utc) - timedelta(hours=1) for it in naive[1:])]
+    for times in (naive, in_zones, [pandas.Timestamp(it) for it in naive], [it - naive[0] for it in naive]):
+        np.testing.assert_array_equal(vsj.simulate("paper", times, [0.0, 300.0, 300.0]), expected)
+    with pytest.raises(vsj.BadInput, match="^time: .*; expected time stamps, all with a zone or all without$"):
+        vsj.simulate("paper", [naive[0], in_zones[1]], [0.0, 300.0])
 
 
 def test_a_copy_has_the_state_and_a_pickle_is_refused(hysteretic):

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from enum import IntFlag
 from typing import List, Mapping, Optional, Tuple
 
@@ -273,8 +274,11 @@ def _bits(value):
 def _seconds(time):
     """Times in s: durations as such, time stamps from the first one."""
     array = _array(time, "time")
-    if array.dtype.kind == "M" and array.size:
-        array = array - array.flat[0]
+    if array.size and (array.dtype.kind == "M" or isinstance(array.flat[0], datetime)):
+        try:
+            array = unmasked(array - array.flat[:1])
+        except TypeError as error:
+            raise _vsj.BadInput(f"time: {error}; expected time stamps, all with a zone or all without") from None
     return vector(array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array, "time")
 
 

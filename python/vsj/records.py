@@ -4,6 +4,7 @@ import json
 import os
 import warnings
 from collections.abc import Mapping
+from datetime import timedelta
 
 import numpy as np
 
@@ -123,7 +124,10 @@ def _column(name, column, units=None):
 def unmasked(values):
     """``values`` as an array in which what a mask hides is missing."""
     if not np.ma.is_masked(values):
-        return np.asarray(values)
+        array = np.asarray(values)
+        # Python's own durations; its time stamps may have zones, which NumPy has not.
+        has_durations = array.dtype.kind == "O" and array.size and all(isinstance(it, timedelta) for it in array.flat)
+        return array.astype("m8[ns]") if has_durations else array
     kind = values.dtype.kind
     if kind in "Mm":
         return values.filled(np.array("NaT", values.dtype))
