@@ -5,7 +5,7 @@ use model::{Amplifier, Approach, Compensation, ExtendedPlant, Feedback, Gains, M
 use serde::Serialize;
 
 use crate::bad_input::BadInput;
-use crate::control_loop::{Controller, gains};
+use crate::control_loop::{Controller, gains, lowered};
 use crate::experiment::{Experiment, HasReference, Run, StartsFrom, with_plant};
 use crate::plant_file::PlantFile;
 use crate::response::{Response, from_present, measure, responses};
@@ -34,6 +34,9 @@ pub struct Comparison {
     pub bound_from: StartsFrom,
     /// One entry per amplifier.
     pub limits: Vec<AtLimit>,
+    /// What the user should know about the gains of the report's controller, one line each.
+    #[serde(skip)]
+    pub remarks: Vec<String>,
 }
 
 /// The responses behind one amplifier.
@@ -103,7 +106,14 @@ pub fn compare(
     });
     let bound_from = ExtendedPlant::bounds_from(&settings(Amplifier::PAPER));
     let limits = limits.collect::<Result<_>>()?;
-    Ok(Comparison { spring_error: actual.map(|actual| actual.spring_error), sensor_noise_v, bound_from, limits })
+    let remarks = lowered(&gains, [None; 2]);
+    Ok(Comparison {
+        spring_error: actual.map(|actual| actual.spring_error),
+        sensor_noise_v,
+        bound_from,
+        limits,
+        remarks,
+    })
 }
 
 /// A spring that differs from the model, and the noise of its sensor in V, if it has one.

@@ -7,7 +7,6 @@ use host_sim::output::terminal::{json, print, remark};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::comparison::{Actual, compare};
-use simulation::control_loop::{Controller, gains, lowered};
 use simulation::option_names::{SETTINGS, named};
 
 use super::plant;
@@ -85,9 +84,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
     let actual = arguments.actual()?;
     let margin = arguments.known.margin()?;
-    let gains = gains([None; 2], Controller::Paper, &file, arguments.rate_hz)?;
-    lowered(&gains, [None; 2]).iter().for_each(|text| remark(text));
     let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)
         .map_err(|error| named(error, SETTINGS))?;
+    comparison.remarks.iter().for_each(|text| remark(text));
     print(&if arguments.json { json(&comparison)? } else { text(&comparison) })
 }
