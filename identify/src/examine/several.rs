@@ -25,13 +25,14 @@ use crate::examine::passes::{self, Normalised, examine, informative, joint, repo
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
-use crate::stats::scale::{centred, root_mean_square};
+use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
 use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::held_findings::add_held;
 use crate::verdict::linear_rival::compare;
+use crate::verdict::quality::fit_percent;
 
 /// Causes that are looked for in each record alone: a hum has a phase of its own in each, and each has a zero of its own.
 const OF_ONE_RECORD: [&str; 2] = ["hum", "reading-offset"];
@@ -148,10 +149,9 @@ fn with_faults(joint: &mut Diagnosis, records: &[Record], faultless: &[Record]) 
     }
     let [rmse, held_out_rmse] =
         [&joint.baseline.residual, &joint.held_out[0]].map(|residual| root_mean_square(residual));
-    let spread = root_mean_square(&centred(&read));
     let Report { baseline, extended, findings, .. } = &mut joint.report;
     (baseline.rmse, baseline.held_out_rmse) = (rmse, held_out_rmse);
-    baseline.fit_percent = 100.0 * (1.0 - rmse / spread);
+    baseline.fit_percent = fit_percent(rmse, &read);
     if !findings.is_empty() {
         extended.gain = 1.0 - extended.quality.held_out_rmse / held_out_rmse.max(1e-12);
     }
