@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Installs the package in the virtual environment of an interpreter, which has maturin.
 pub(crate) fn install(python: &Path, target: &Path, profile: &str) -> Result<()> {
-    // In the same folder: what package and command depend on with the same features is built once.
+    // In the same folder: what package and command depend on with the same features and profile is built once, if it is of the registry.
     let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
     let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
     let profile = format!("--profile {profile}");
