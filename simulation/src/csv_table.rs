@@ -103,8 +103,9 @@ impl<'a> Table<'a> {
         keep_columns(&mut header, separator, |index| index <= last_name);
         let twice =
             |(index, column): &(usize, &str)| !column.is_empty() && header.iter().take(*index).any(|c| c == *column);
-        let commented_header =
-            commented.filter(|(_, names)| are_names(names, separator, header.len())).map(|(line, _)| line);
+        let commented_header = commented
+            .filter(|(_, names)| header.len() > 1 && are_names(names, separator, header.len()))
+            .map(|(line, _)| line);
         // Numbers are no names: the error for a missing column says so.
         if !are_numbers(&header)
             && let Some((_, column)) = header.iter().enumerate().find(twice)

@@ -450,6 +450,7 @@ fn a_header_in_a_comment_is_named() {
         "r.csv, line 2: the names of the columns are a comment; expected a header: remove the mark in front of them"
     );
     assert!(error("% t_s,u_V,x_mm\n0.0,0.0,1.5\n0.5,0.0,1.25\n").starts_with("r.csv, line 1: the names"));
+    assert!(error("# run by Bob\n0.5\n0.25\n").starts_with("r.csv, line 2: numbers instead of names"), "one column");
     assert!(error("# two columns\n0.0,0.0,1.5\n0.5,0.0,1.25\n").starts_with("r.csv, line 2: numbers instead of names"));
 }
 
