@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::bad_input::BadInput;
+use crate::bad_input::{BadInput, excerpt, one_line};
 
 /// A unit of time or voltage: its name, and its size in s or V.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,7 +105,10 @@ impl Unit {
     pub fn of_time(name: &str) -> Result<Self, BadInput> {
         let known = TIMES.iter().find(|(_, usual, others)| *usual == name || others.contains(&name));
         let known = known.map(|&(si, usual, _)| Self::of(usual, si));
-        known.ok_or_else(|| BadInput(format!("`{name}` is not a unit of time; expected ns, us, ms, s, min, h or d")))
+        known.ok_or_else(|| {
+            let name = one_line(&excerpt(name));
+            BadInput(format!("`{name}` is not a unit of time; expected ns, us, ms, s, min, h or d"))
+        })
     }
 
     /// Returns the unit of voltage with a name. A command in any other unit (a heater's percent, an ampere, a code) is

@@ -290,6 +290,11 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
             "--time t [weeks]: `weeks` is not a unit of time; expected ns",
         ),
         (
+            "stiffness,u_V,a\nV,V,\"s]\n1,2,3\n1,2,4\n".into(),
+            &asked("a"),
+            "--time a: `s]\\n1,2,3\\n1,2,4` is not a unit of time; expected ns",
+        ),
+        (
             "time,u_V,x_mm\n2026-01-31,1,2\n".into(),
             &any,
             "line 2, column time: `2026-01-31` is a date without time; expected",
