@@ -5,6 +5,7 @@ use core::sync::atomic::Ordering;
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::once_lock::OnceLock;
 use embassy_time::{Duration, Timer};
 use link::adaptation::Adaptation as Request;
 use link::isolation::Off;
@@ -19,25 +20,26 @@ use crate::{log, stop};
 /// Longest wait for the housekeeping task to take a request, in ms: it looks for one every 10 ms, and after each line of the log.
 const PATIENCE_MS: u32 = 30;
 
-static TERMS: Mutex<CriticalSectionRawMutex, Cell<Option<Terms>>> = Mutex::new(Cell::new(None));
+static TERMS: OnceLock<Terms> = OnceLock::new();
 /// What the host wants to be switched.
 static SWITCH: Mutex<CriticalSectionRawMutex, Cell<Option<bool>>> = Mutex::new(Cell::new(None));
 /// What the adaptation does; `None` before the housekeeping task has begun.
 static LATEST: Mutex<CriticalSectionRawMutex, Cell<Option<AdaptationReport>>> = Mutex::new(Cell::new(None));
 /// What the last block has shown, and its last tick.
 static SEEN: Mutex<CriticalSectionRawMutex, Cell<Option<(Observation, u64)>>> = Mutex::new(Cell::new(None));
-/// What is exchanged at the end of the present block.
-static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Variant>>> = Mutex::new(RefCell::new(None));
+/// What is exchanged at the end of the present block. Without the inner cell, which hides the unused codes of a variant, `None` would be
+/// one of them, not zero, and the flash would contain the whole variant for the start.
+static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Cell<Variant>>>> = Mutex::new(RefCell::new(None));
 
-/// Sets the constant properties, at the start.
+/// Sets the constant properties, once, at the start.
 pub fn set_terms(terms: Terms) {
-    TERMS.lock(|cell| cell.set(Some(terms)));
+    let _ = TERMS.init(terms);
 }
 
 impl Planner {
     /// A planner for the properties of the start.
     pub fn begin() -> Self {
-        let planner = Self::new(TERMS.lock(Cell::get).unwrap_or(Terms::NONE));
+        let planner = Self::new(*TERMS.try_get().unwrap_or(&Terms::NONE));
         planner.publish();
         planner
     }
@@ -57,7 +59,8 @@ pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick,
     let seen = NEXT.lock(|next| {
         // Nobody else holds it while interrupts are off.
         let mut next = next.try_borrow_mut().ok();
-        let seen = isolation.end_block(control, tick, next.as_ref().and_then(|next| next.as_ref()));
+        let variant = next.as_mut().and_then(|next| next.as_mut()).map(|next| &*next.get_mut());
+        let seen = isolation.end_block(control, tick, variant);
         if let Some(next) = &mut next {
             **next = None;
         }
@@ -79,7 +82,7 @@ pub fn serve(planner: &mut Planner) {
     let change = planner.plan(&seen, tick);
     NEXT.lock(|next| {
         if let Ok(mut next) = next.try_borrow_mut() {
-            *next = planner.next().copied();
+            *next = planner.next().copied().map(Cell::new);
         }
     });
     planner.publish();

@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::once_lock::OnceLock;
 use embassy_time::{Duration, Timer};
 use link::isolation::{Isolation as Request, Off};
 use link::{IsolationReport, Notice, Reply};
@@ -17,12 +18,12 @@ const PATIENCE_MS: u32 = 20;
 
 /// The latest report, and the tick after which its fault has been there.
 static LATEST: Mutex<CriticalSectionRawMutex, Cell<Option<(Report, u64)>>> = Mutex::new(Cell::new(None));
-static TERMS: Mutex<CriticalSectionRawMutex, Cell<Option<Terms>>> = Mutex::new(Cell::new(None));
+static TERMS: OnceLock<Terms> = OnceLock::new();
 static ACKNOWLEDGED: AtomicBool = AtomicBool::new(false);
 
-/// Sets the constant properties, at the start.
+/// Sets the constant properties, once, at the start.
 pub fn set_terms(terms: Terms) {
-    TERMS.lock(|cell| cell.set(Some(terms)));
+    let _ = TERMS.init(terms);
 }
 
 /// Publishes what has changed in a tick, counted from the start.
@@ -60,7 +61,7 @@ pub fn notice(tick: u64, is_due: impl FnOnce(u16) -> bool) -> Option<(u16, Notic
 
 /// Returns a report in SI units.
 pub fn describe(report: &Report, tick: u64, since_tick: u64) -> IsolationReport {
-    match TERMS.lock(Cell::get) {
+    match TERMS.try_get() {
         Some(terms) => terms.describe(report, tick, since_tick),
         // Before the start of the control task.
         None => IsolationReport::off(Off::NoSensor, tick, Causes::NONE),
