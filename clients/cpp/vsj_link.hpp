@@ -627,9 +627,10 @@ public:
         return isolation_;
     }
 
-    /// Telemetry that arrives within `wait`.
+    /// Telemetry since the last call, of which at most the newest `most_samples` are kept, and all that arrives within `wait`.
     std::vector<Sample> samples(Clock::duration wait) {
         const auto until = Clock::now() + wait;
+        std::vector<Sample> all;
         for (;; std::this_thread::yield()) {
             const Lock lock(mutex_);
             // In short turns, between which other threads have theirs.
@@ -637,13 +638,20 @@ public:
             while (next_answer(turn)) {
             }
             beat_if_due();
-            if (Clock::now() >= until) {
-                std::vector<Sample> all(samples_.begin(), samples_.end());
-                samples_.clear();
-                return all;
-            }
+            all.insert(all.end(), samples_.begin(), samples_.end());
+            samples_.clear();
+            if (Clock::now() >= until) return all;
         }
     }
+
+    /// Number of samples that this program has dropped because it did not take them.
+    std::uint64_t dropped_samples() {
+        const Lock lock(mutex_);
+        return dropped_samples_;
+    }
+
+    /// Largest number of samples that are kept until they are taken: those of four minutes at 115 200 bit/s.
+    static constexpr std::size_t most_samples = 65'536;
 
     /// All samples of a time; for endless ones use `stream` and `samples`.
     std::vector<Sample> watch(double rate_hz, Clock::duration length) {
@@ -702,6 +710,7 @@ private:
     Bytes encoded_;
     std::deque<std::uint8_t> received_;
     std::deque<Sample> samples_;
+    std::uint64_t dropped_samples_ = 0;
     std::optional<Isolation> isolation_;
     /// Numbers of the reports of faults whose receipt the microcontroller does not know of yet.
     std::set<std::uint32_t> unheard_;
@@ -836,7 +845,7 @@ private:
                 const auto code = from.number();
                 if (code == 3) {
                     const Sample sample = Sample::read(from, status_.rate_hz);
-                    if (from.is_whole()) samples_.push_back(sample);
+                    if (from.is_whole()) keep(sample);
                 } else if (code == 5) {
                     const Fault fault = Fault::read(from, status_.rate_hz);
                     if (from.is_whole() && unheard_.insert(fault.number).second) reported_.push_back(fault);
@@ -848,6 +857,14 @@ private:
             const Bytes bytes = port_.read(until);
             received_.insert(received_.end(), bytes.begin(), bytes.end());
         }
+    }
+
+    void keep(const Sample& sample) {
+        if (samples_.size() == most_samples) {
+            samples_.pop_front();
+            ++dropped_samples_;
+        }
+        samples_.push_back(sample);
     }
 
     void notice(const Bytes& message) {

@@ -39,13 +39,15 @@ pub(crate) fn run() -> Result<()> {
     watch::run(&vsj, &elf).context("vsj watch --emulated")
 }
 
-/// Compiles the header with CMake, and runs its tests: every frame of the protocol, then the board without and with an isolation bank.
+/// Compiles the header with CMake, and runs its tests: every frame of the protocol, an MCU that does what no healthy board does, then the
+/// board without and with an isolation bank.
 fn cpp(cmake: &Path, elf: &Path, with_bank: &Path, target: &Path) -> Result<()> {
     let built = target.join("clients-cpp");
     let source = shell::root().join(CPP);
     shell::run(shell::command(cmake).arg("-S").arg(&source).arg("-B").arg(&built).arg("-DCMAKE_BUILD_TYPE=Debug"))?;
     shell::run(shell::command(cmake).arg("--build").arg(&built).args(["--parallel", "2"]))?;
     shell::run(shell::command(built.join("frames")).arg(source.join("golden")))?;
+    shell::run(&mut shell::command(built.join("host")))?;
     let folder = tempfile::tempdir()?;
     on_board(elf, "cpp", |port| {
         let mut command = shell::command(built.join("board"));

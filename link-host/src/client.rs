@@ -1,7 +1,7 @@
 //! The host's side of a request: send, wait for the answer, repeat.
 //!
 //! A request is repeated with the same sequence number until it is answered or the retries end; the MCU applies it
-//! once, however often it arrives. Telemetry that arrives meanwhile is kept in order.
+//! once, however often it arrives. Telemetry that arrives meanwhile is kept in order, the newest [`MOST_SAMPLES`] of it.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant, SystemTime};
@@ -53,12 +53,17 @@ pub struct Client {
     read: VecDeque<u8>,
     bytes: u64,
     samples: VecDeque<Telemetry>,
+    /// Number of samples that were dropped because nobody took them.
+    dropped_samples: u64,
     /// What the isolation bank said last with the telemetry of this session.
     verdict: Option<IsolationReport>,
     /// Reports of faults whose receipt the MCU does not know of yet.
     unheard: Vec<FaultReport>,
     reports: Vec<FaultReport>,
 }
+
+/// Largest number of samples that are kept until they are taken: those of four minutes at 115 200 bit/s.
+pub const MOST_SAMPLES: usize = 1 << 16;
 
 /// Requests after which a client begins a new session: a session has 65 536 numbers.
 const MOST_REQUESTS: u16 = 60_000;
@@ -99,6 +104,7 @@ impl Client {
             read,
             bytes: 0,
             samples,
+            dropped_samples: 0,
             verdict: None,
             unheard,
             reports,
@@ -129,7 +135,7 @@ impl Client {
         self.verdict
     }
 
-    /// Waits for `wait` and returns all telemetry received.
+    /// Waits for `wait` and returns the telemetry received since the last call, of which at most the newest [`MOST_SAMPLES`] are kept.
     ///
     /// # Errors
     /// [`Failure::Port`]
@@ -138,6 +144,12 @@ impl Client {
         // Answers that arrive now are copies of earlier ones.
         while self.next_answer(until)?.is_some() {}
         Ok(self.samples.drain(..))
+    }
+
+    /// Number of samples that this client has dropped because nobody took them: all but the newest [`MOST_SAMPLES`]. Those that the MCU
+    /// has dropped are in its status.
+    pub fn dropped_samples(&self) -> u64 {
+        self.dropped_samples
     }
 
     /// Disables the output before the connection ends, without waiting long for an answer; not that of an MCU which another program
@@ -243,7 +255,13 @@ impl Client {
             while let Some(byte) = self.read.pop_front() {
                 let Some(packet) = self.receiver.on_byte(byte) else { continue };
                 match packet.read::<Reply>() {
-                    Ok(Reply::Telemetry(sample)) => self.samples.push_back(sample),
+                    Ok(Reply::Telemetry(sample)) => {
+                        if self.samples.len() == MOST_SAMPLES {
+                            self.samples.pop_front();
+                            self.dropped_samples += 1;
+                        }
+                        self.samples.push_back(sample);
+                    }
                     Ok(Reply::Fault(report)) => {
                         // A repetition differs in the faults that stand when it is sent.
                         let repeats =
@@ -405,6 +423,23 @@ mod tests {
         drop(client);
         let counters = thread.join().unwrap();
         assert_eq!((counters.out_of_order, counters.unknown), (0, 0));
+    }
+
+    /// Heartbeats from a thread go on receiving what a program has asked for and does not take.
+    #[test]
+    fn the_oldest_samples_that_nobody_takes_are_dropped_and_counted_and_no_report() {
+        let (mut client, thread) = connected(|_| Faults::NONE);
+        let report = FaultReport { number: 1, ..FaultReport::default() };
+        client.read.extend(Frame::new(Nonce::NONE.stamp(Sequence(0)), &Reply::Fault(report)).as_bytes());
+        for tick in 0..MOST_SAMPLES as u64 + 3 {
+            let sample = Reply::Telemetry(Telemetry { tick, ..Telemetry::default() });
+            client.read.extend(Frame::new(Nonce::NONE.stamp(Sequence(tick as u16)), &sample).as_bytes());
+        }
+        let ticks: Vec<u64> = client.samples(Duration::ZERO).unwrap().map(|sample| sample.tick).collect();
+        assert_eq!((ticks.len(), ticks[0], client.dropped_samples()), (MOST_SAMPLES, 3, 3));
+        assert_eq!(client.reports(), [report]);
+        drop(client);
+        thread.join().unwrap();
     }
 
     /// A program that sends heartbeats without reading their answers would not notice that the MCU has restarted.

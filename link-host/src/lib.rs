@@ -16,7 +16,7 @@ mod port;
 mod report;
 mod requests;
 
-pub use client::{Client, Patience, heartbeat};
+pub use client::{Client, MOST_SAMPLES, Patience, heartbeat};
 pub use command::{desired, fault, refusal};
 pub use failure::Failure;
 pub use port::Port;

@@ -1,0 +1,243 @@
+// The client and an MCU within this program, which does what no healthy board does.
+#include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+
+#include <vsj_link.hpp>
+
+namespace {
+
+void expect(bool is_so, const std::string& what) {
+    if (is_so) return;
+    std::cerr << "expected: " << what << '\n';
+    std::exit(1);
+}
+
+std::string error_of(const std::function<void()>& work) {
+    try {
+        work();
+    } catch (const vsj::Error& error) {
+        return error.what();
+    }
+    return "";
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+using vsj::Bytes;
+using vsj::wire::Writer;
+
+constexpr std::uint8_t hello = 0, ask_status = 1, disarm = 4, stream = 7, heard = 12;
+
+Writer& sample(Writer& message, std::uint64_t tick) {
+    message.number(tick);
+    for (int field = 0; field < 9; ++field) message.byte(0);
+    return message;
+}
+
+Bytes status(std::uint32_t silence_limit_ticks) {
+    Writer message;
+    message.byte(2).byte(0).byte(1).byte(0);
+    for (const std::uint32_t number : {0u, 0u, 1000u, silence_limit_ticks, 0u, 0u, 0u, 0u, 0u}) message.number(number);
+    sample(message, 0);
+    for (int counter = 0; counter < 8; ++counter) message.byte(0);
+    return message.bytes;
+}
+
+/// Answers what comes on a file until the other side closes it, after what `before` sends ahead of the answer.
+class Mcu {
+public:
+    /// Number of requests by their code.
+    std::array<std::atomic<unsigned>, 32> asked{};
+    /// True if each request but a Hello is refused, as of another session.
+    std::atomic<bool> is_of_another_session{false};
+
+    explicit Mcu(std::function<Bytes(const Bytes&)> before = {}) : before_(std::move(before)) {}
+    ~Mcu() { thread_.join(); }
+
+    void serve(int file) {
+        thread_ = std::thread([this, file] {
+            Bytes encoded, bytes(1024);
+            for (ssize_t count; (count = ::read(file, bytes.data(), bytes.size())) > 0;) {
+                for (ssize_t at = 0; at < count; ++at) {
+                    const std::uint8_t byte = bytes[static_cast<std::size_t>(at)];
+                    if (byte != 0) encoded.push_back(byte);
+                    if (byte == 0 && !encoded.empty()) answer(file, *vsj::wire::open(std::exchange(encoded, {})));
+                }
+            }
+            ::close(file);
+        });
+    }
+
+    void accept(int listener) {
+        const int file = ::accept(listener, nullptr, nullptr);
+        ::close(listener);
+        serve(file);
+    }
+
+private:
+    std::function<Bytes(const Bytes&)> before_;
+    Bytes last_;
+    std::uint32_t nonce_ = 0;
+    std::thread thread_;
+
+    void answer(int file, const vsj::wire::Packet& request) {
+        const std::uint8_t code = request.message[0];
+        ++asked[code];
+        if (code == hello) ++nonce_;
+        Bytes reply{0, 0, 0};
+        if (code == hello || code == ask_status) reply = status(60'000);
+        if (code != hello && is_of_another_session) reply = {1, 18};
+        Bytes out = before_ ? before_(request.message) : Bytes{};
+        const Bytes frame = vsj::wire::frame(vsj::wire::reply_kind, request.sequence, reply, nonce_);
+        out.insert(out.end(), frame.begin(), frame.end());
+        for (std::size_t sent = 0; sent < out.size();) {
+            const auto count = ::write(file, out.data() + sent, out.size() - sent);
+            if (count <= 0) return;
+            sent += static_cast<std::size_t>(count);
+        }
+    }
+};
+
+/// Ports of the two addresses that every name has, see `getaddrinfo`.
+std::uint16_t ports[2];
+
+/// A TCP socket that listens on a free port, which is written to `port`.
+int listening(std::uint16_t& port) {
+    const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof address;
+    ::bind(listener, reinterpret_cast<const sockaddr*>(&address), length);
+    ::listen(listener, 1);
+    ::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length);
+    port = ntohs(address.sin_port);
+    return listener;
+}
+
+/// Runs `work` with a client of this MCU.
+void with_link(Mcu& mcu, const std::function<void(vsj::Link&)>& work) {
+    const int listener = listening(ports[1]);
+    std::thread accepting([&] { mcu.accept(listener); });
+    vsj::Link link("tcp:mcu:1", 0, std::chrono::seconds(20));
+    accepting.join();
+    work(link);
+}
+
+/// Heartbeats go on receiving what a program has asked for and does not take.
+void samples_that_nobody_takes() {
+    constexpr std::size_t beyond = 3;
+    bool is_sent = false;
+    Mcu mcu([&](const Bytes& request) {
+        Bytes out;
+        if (request[0] != disarm || std::exchange(is_sent, true)) return out;
+        const auto add = [&](const Bytes& message) {
+            const Bytes frame = vsj::wire::frame(vsj::wire::reply_kind, 0, message, 1);
+            out.insert(out.end(), frame.begin(), frame.end());
+        };
+        add(Writer().byte(5).number(1).number(7).byte(4).number(8).byte(0).bytes);
+        for (std::uint64_t tick = 0; tick < vsj::Link::most_samples + beyond; ++tick) {
+            Writer message;
+            add(sample(message.byte(3), tick).bytes);
+        }
+        return out;
+    });
+    with_link(mcu, [](vsj::Link& link) {
+        link.disarm();
+        const auto samples = link.samples({});
+        expect(samples.size() == vsj::Link::most_samples && samples.front().tick == beyond, "the newest samples");
+        expect(link.dropped_samples() == beyond, "the others counted");
+        const auto faults = link.faults();
+        expect(faults.size() == 1 && faults[0].code == 4 && faults[0].tick == 7 && faults[0].standing == 8, "a fault kept");
+        expect(link.faults().empty(), "a fault reported once");
+    });
+    expect(mcu.asked[heard] == 1, "a report whose receipt the MCU knows of");
+}
+
+/// A session has 65 536 numbers; refusals as of another session use none.
+void numbers_that_run_out() {
+    Mcu mcu;
+    with_link(mcu, [&](vsj::Link& link) {
+        link.stream(100);
+        mcu.is_of_another_session = true;
+        for (int count = 0; count < 60'000; ++count)
+            expect(contains(error_of([&] { link.disarm(); }), "in a session with another program"), "a refusal");
+        expect(mcu.asked[hello] == 1 && mcu.asked[stream] == 1, "no session begun by refusals");
+        mcu.is_of_another_session = false;
+        for (int count = 0; count < 60'000; ++count) link.disarm();
+        expect(mcu.asked[hello] == 2 && mcu.asked[stream] == 2, "another session with the telemetry of the first");
+    });
+}
+
+/// What an earlier program has left: flow control, and two stop bits.
+void flags_of_a_serial_device() {
+    const int master = ::posix_openpt(O_RDWR | O_NOCTTY);
+    expect(master >= 0 && ::grantpt(master) == 0 && ::unlockpt(master) == 0, "a pseudo-terminal");
+    const std::string name = ::ptsname(master);
+    // A terminal that nobody holds open hangs up.
+    const int slave = ::open(name.c_str(), O_RDWR | O_NOCTTY);
+    termios left{};
+    ::tcgetattr(slave, &left);
+    left.c_iflag |= IXON | IXOFF | IXANY;
+    left.c_cflag |= CSTOPB | CRTSCTS;
+    ::tcsetattr(slave, TCSANOW, &left);
+    expect(contains(error_of([&] { vsj::Port port(name, 115'201, {}); }), "a baud rate of 115201 is not usual"), "a refusal");
+    {
+        Mcu mcu;
+        mcu.serve(::dup(master));
+        {
+            vsj::Link link(name, 57'600, std::chrono::seconds(20));
+            termios line{};
+            ::tcgetattr(slave, &line);
+            expect(::cfgetospeed(&line) == B57600 && ::cfgetispeed(&line) == B57600, "the rate asked for");
+            expect((line.c_iflag & (IXON | IXOFF | IXANY | ICRNL)) == 0, "no flow control by bytes, and no byte changed");
+            expect((line.c_cflag & (CSTOPB | CRTSCTS | PARENB)) == 0 && (line.c_cflag & CSIZE) == CS8, "8N1 without flow control");
+            expect((line.c_lflag & (ICANON | ECHO)) == 0, "bytes, no lines");
+        }
+        ::close(slave);
+    }
+    ::close(master);
+}
+
+/// The first address of a name refuses the connection.
+void all_addresses_of_a_name() {
+    ::close(listening(ports[0]));
+    Mcu mcu;
+    with_link(mcu, [](vsj::Link& link) { link.status(); });
+    expect(mcu.asked[disarm] == 1, "a disarm at the end");
+    expect(contains(error_of([] { vsj::Link link("tcp:mcu:1"); }), "cannot be opened: Connection refused"), "nobody there");
+}
+
+}  // namespace
+
+/// In place of the library's: every name has two addresses.
+extern "C" int getaddrinfo(const char*, const char*, const addrinfo*, addrinfo** found) {
+    static sockaddr_in addresses[2];
+    static addrinfo infos[2];
+    for (std::size_t at = 0; at < 2; ++at) {
+        addresses[at] = {};
+        addresses[at].sin_family = AF_INET;
+        addresses[at].sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        addresses[at].sin_port = htons(ports[at]);
+        infos[at] = {};
+        infos[at].ai_family = AF_INET;
+        infos[at].ai_socktype = SOCK_STREAM;
+        infos[at].ai_addr = reinterpret_cast<sockaddr*>(&addresses[at]);
+        infos[at].ai_addrlen = sizeof addresses[at];
+    }
+    infos[0].ai_next = &infos[1];
+    *found = infos;
+    return 0;
+}
+
+extern "C" void freeaddrinfo(addrinfo*) noexcept {}
+
+int main() {
+    all_addresses_of_a_name();
+    flags_of_a_serial_device();
+    samples_that_nobody_takes();
+    numbers_that_run_out();
+    std::puts("dropped samples counted, a session renewed, a serial device set, every address tried");
+}
