@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
@@ -13,7 +13,7 @@ use simulation::bad_input;
 
 /// Longest wait for received bytes.
 const POLL: Duration = Duration::from_millis(5);
-/// Longest wait for bytes to be sent.
+/// Longest wait for bytes to be taken by the device or socket.
 const WRITE: Duration = Duration::from_secs(1);
 
 /// An open port.
@@ -56,11 +56,7 @@ impl Port {
     pub fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.stream.read(buffer) {
             Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
-            Err(error)
-                if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
-            {
-                Ok(0)
-            }
+            Err(error) if is_not_yet(&error) => Ok(0),
             read => read,
         }
     }
@@ -69,9 +65,23 @@ impl Port {
     ///
     /// # Errors
     /// If they are not taken within a second, or the other side has closed the connection.
-    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.stream.write_all(bytes)
+    pub fn write(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        let until = Instant::now() + WRITE;
+        while !bytes.is_empty() {
+            match self.stream.write(bytes) {
+                Ok(0) => return Err(ErrorKind::WriteZero.into()),
+                Ok(count) => bytes = &bytes[count..],
+                // The timeout of a serial device is that of reading.
+                Err(error) if is_not_yet(&error) && Instant::now() < until => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
+}
+
+fn is_not_yet(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
 fn connect(name: &str, baud: u32) -> io::Result<Box<dyn Stream>> {
@@ -113,8 +123,46 @@ fn unix(_: &str) -> io::Result<Box<dyn Stream>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::VecDeque;
     use std::net::TcpListener;
-    use std::time::Instant;
+    use std::sync::{Arc, Mutex};
+
+    /// A device that takes longer than the timeout of its driver: what each attempt to write comes to, and what was written.
+    struct Slow {
+        attempts: VecDeque<io::Result<usize>>,
+        written: Arc<Mutex<Vec<u8>>>,
+    }
+
+    impl Read for Slow {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(ErrorKind::TimedOut.into())
+        }
+    }
+
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let count = self.attempts.pop_front().unwrap_or(Ok(bytes.len()))?;
+            self.written.lock().unwrap().extend(&bytes[..count]);
+            Ok(count)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_frame_is_sent_whole_although_the_device_takes_it_piece_by_piece() {
+        let late = || Err(ErrorKind::TimedOut.into());
+        let written = Arc::default();
+        let attempts = [late(), late(), Ok(1), Err(ErrorKind::Interrupted.into()), late(), Ok(2)].into();
+        let stream = Box::new(Slow { attempts, written: Arc::clone(&written) });
+        let mut port = Port { name: "slow".to_owned(), stream };
+        port.write(&[1, 2, 3, 4, 5]).unwrap();
+        assert_eq!(*written.lock().unwrap(), [1, 2, 3, 4, 5]);
+        port.stream = Box::new(Slow { attempts: [Ok(1), Ok(0)].into(), written });
+        assert_eq!(port.write(&[1, 2]).unwrap_err().kind(), ErrorKind::WriteZero);
+    }
 
     /// A listener that accepts nothing takes as many connections as it may keep waiting; further ones are not answered.
     #[cfg(target_os = "linux")]
