@@ -552,7 +552,7 @@ public:
         // Telemetry sent before the greeting belongs to an earlier program.
         samples_.clear();
         isolation_.reset();
-        const double beat_s = std::clamp(status_.silence_limit_s / 5.0, 0.01, 1.0);
+        const double beat_s = std::clamp(status_.silence_limit_s / 5.0, 0.001, 1.0);
         beat_ = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(beat_s));
         beating_ = std::thread([this] { heartbeats(); });
     }
@@ -716,6 +716,7 @@ private:
     std::set<std::uint32_t> unheard_;
     std::vector<Fault> reported_;
     Clock::duration beat_{};
+    /// When the last request was begun.
     Clock::time_point heard_ = Clock::now();
     std::mutex closing_lock_;
     std::condition_variable wake_;
@@ -805,13 +806,13 @@ private:
         const bool is_hello = message[0] == 0;
         ++sequence_;
         ++requests_;
+        heard_ = Clock::now();
         const Bytes frame = wire::frame(wire::request_kind, sequence_, message, session_);
         for (int turn = 0; turn < tries_; ++turn) {
             port_.write(frame);
             const auto until = Clock::now() + each;
             while (auto answer = next_answer(until)) {
                 if (answer->sequence != sequence_) continue;
-                heard_ = Clock::now();
                 if (answer->version != wire::version) refuse({3, answer->version});
                 if (is_hello) session_ = answer->session;
                 // No number of the session was used: the microcontroller knows another one, or none.

@@ -32,10 +32,10 @@ impl Patience {
     }
 }
 
-/// Interval of heartbeats: five within the longest silence that the MCU allows, 0.01 s to 1 s.
+/// Interval of heartbeats from the beginning of one to that of the next: a fifth of the longest silence that the MCU allows, 1 ms to 1 s.
 pub fn heartbeat(status: &Status) -> Duration {
     let limit_s = f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1));
-    Duration::from_secs_f64((limit_s / 5.0).clamp(0.01, 1.0))
+    Duration::from_secs_f64((limit_s / 5.0).clamp(0.001, 1.0))
 }
 
 /// A connection to an MCU.
@@ -380,6 +380,17 @@ mod tests {
         let thread = std::thread::spawn(move || mcu(listener, standing));
         let port = Port::open(&format!("unix:{}", path.display()), 115_200, Duration::from_secs(1)).unwrap();
         (Client::greet(port, Patience::of(Duration::from_secs(5))).unwrap().0, thread)
+    }
+
+    /// Of every limit that the settings may have, and of a status without any.
+    #[test]
+    fn five_heartbeats_fall_within_the_longest_silence() {
+        for (silence_limit_ticks, rate_hz, ms) in
+            [(500, 1000, 100), (50, 1000, 10), (20, 1000, 4), (10, 1000, 2), (120_000, 2000, 1000), (0, 0, 1)]
+        {
+            let status = Status { silence_limit_ticks, rate_hz, ..Status::default() };
+            assert_eq!(heartbeat(&status), Duration::from_millis(ms), "{silence_limit_ticks} ticks at {rate_hz} Hz");
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ struct Connection {
     client: Client,
     status: Status,
     heartbeat: Duration,
-    /// When the MCU last heard of this program.
+    /// When this program last began to send a request.
     heard: Instant,
 }
 
@@ -124,10 +124,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Sends heartbeats until the port is closed, then disables the output; a lost connection is reported by the next call.
 fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
     while !closing.load(Ordering::Relaxed) {
+        let mut pause = TURN;
         if let Some(connection) = lock(connection).as_mut() {
             let _ = connection.beat();
+            pause = pause.min(connection.heartbeat / 4);
         }
-        thread::park_timeout(TURN);
+        thread::park_timeout(pause);
     }
     if let Some(connection) = lock(connection).as_mut() {
         connection.client.leave();

@@ -170,8 +170,8 @@ impl<'a> Worker<'a> {
                 self.read_status(client)?;
                 (read, heard) = (Instant::now(), Instant::now());
             } else if heard.elapsed() >= heartbeat(&self.status) {
-                self.state = client.order(Request::Heartbeat)?.0;
                 heard = Instant::now();
+                self.state = client.order(Request::Heartbeat)?.0;
             }
             self.tell_faults(client);
             self.collect(client)?;

@@ -70,7 +70,7 @@ pub(super) struct Drive<'a> {
     heartbeat: Duration,
     /// The last commanded voltage.
     commanded: Option<f64>,
-    /// When the MCU last heard from this program.
+    /// When this program last began to send a request.
     heard: Instant,
 }
 
@@ -87,16 +87,16 @@ impl<'a> Drive<'a> {
         if let Some((from, reader)) = &mut self.reader {
             let volts = reader.at(*from + self.start.elapsed().as_secs_f64());
             if self.commanded != Some(volts) {
-                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
                 (self.commanded, self.heard) = (Some(volts), Instant::now());
+                session.order(Request::Set(Desired::ScaledVolts(volts)))?;
             }
         }
         if self.heard.elapsed() >= self.heartbeat {
+            self.heard = Instant::now();
             let (state, _) = session.order(Request::Heartbeat)?;
             if self.reader.is_some() {
                 session.still_armed(state)?;
             }
-            self.heard = Instant::now();
         }
         Ok(())
     }

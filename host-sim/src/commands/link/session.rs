@@ -120,8 +120,11 @@ impl Session {
         stop_on_interrupt();
         let (start, pause) = (Instant::now(), heartbeat(&self.status));
         while start.elapsed() < time && !stopped() {
+            // The answer takes its time as well.
+            let next = Instant::now() + pause;
             let (state, _) = self.order(Request::Heartbeat)?;
             self.still_armed(state)?;
+            let pause = next.saturating_duration_since(Instant::now());
             std::thread::sleep(pause.min(time.saturating_sub(start.elapsed())));
         }
         Ok(())
