@@ -42,6 +42,8 @@ pub fn heartbeat(status: &Status) -> Duration {
 pub struct Client {
     port: Port,
     patience: Patience,
+    /// True if the program is to end.
+    interrupted: fn() -> bool,
     receiver: Receiver,
     sequence: Sequence,
     session: Nonce,
@@ -71,6 +73,9 @@ const MOST_REQUESTS: u16 = 60_000;
 /// Longest wait for the answer to the last request.
 const LEAVING: Duration = Duration::from_millis(200);
 
+/// Largest number of times that a request is sent by a program that is to end: enough for an answer on a bad line.
+const LAST_TRIES: u32 = 3;
+
 /// Reports that are confirmed after one request, at most.
 const MOST_HEARD: usize = 16;
 
@@ -96,6 +101,7 @@ impl Client {
         let mut client = Self {
             port,
             patience,
+            interrupted: || false,
             receiver,
             sequence,
             session,
@@ -152,16 +158,22 @@ impl Client {
         self.dropped_samples
     }
 
+    /// Makes requests that are not answered within 0.3 s fail with [`Failure::Interrupted`] as soon as `asked` is true. It is called while
+    /// a request waits, in the thread of its caller.
+    pub fn interrupt_when(&mut self, asked: fn() -> bool) {
+        self.interrupted = asked;
+    }
+
     /// Disables the output before the connection ends, without waiting long for an answer; not that of an MCU which another program
     /// commands by now.
-    pub fn leave(&mut self) {
+    ///
+    /// # Errors
+    /// [`Failure`] if the MCU has not confirmed it; without its host it ramps down by itself.
+    pub fn leave(&mut self) -> Result<(), Failure> {
         self.patience = Patience::of(LEAVING);
-        if !matches!(
-            self.exchange(Request::Heartbeat),
-            Err(Failure::Refused(Reason::OtherSession | Reason::HelloFirst))
-        ) {
-            // Without its host the MCU ramps down by itself.
-            let _ = self.exchange(Request::Disarm);
+        match self.exchange(Request::Heartbeat) {
+            Err(failure @ Failure::Refused(Reason::OtherSession | Reason::HelloFirst)) => Err(failure),
+            _ => self.exchange(Request::Disarm).map(drop),
         }
     }
 
@@ -224,7 +236,10 @@ impl Client {
         self.requests = self.requests.saturating_add(1);
         let frame = Frame::new(self.session.stamp(self.sequence), &request);
         let before = self.bytes;
-        for _ in 0..self.patience.tries {
+        for tried in 0..self.patience.tries {
+            if tried >= LAST_TRIES && (self.interrupted)() {
+                return Err(Failure::Interrupted);
+            }
             self.port.write(frame.as_bytes()).map_err(Failure::Port)?;
             let until = Instant::now() + self.patience.each;
             while let Some(Answer { sequence, session, reply }) = self.next_answer(until)? {

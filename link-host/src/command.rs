@@ -1,7 +1,7 @@
 //! Requests with the errors of the command `vsj link`, in its words, for every program that sends them.
 
 use anyhow::{Context, Result};
-use link::{Desired, Fault, Reason, Request, State, WireVolts};
+use link::{Desired, Fault, Reason, Request, State, Status, WireVolts};
 use simulation::bad_input;
 
 use crate::client::Client;
@@ -22,6 +22,14 @@ impl Client {
             Err(failure) => Err(failure).with_context(|| self.name().to_owned()),
         }
     }
+}
+
+/// What to say of an MCU at the port `name` that has not confirmed that its output is disabled.
+pub fn not_disarmed(name: &str, reason: &str, status: &Status) -> String {
+    let limit_s = f64::from(status.silence_limit_ticks) / f64::from(status.rate_hz.max(1));
+    format!(
+        "{name}: not disarmed: {reason}; an armed MCU ramps its voltage down by itself {limit_s} s after it last heard of its host"
+    )
 }
 
 /// Why the MCU has rejected the request, as text. The bounds of a range come without their unit, which is that of the request.

@@ -30,6 +30,8 @@ pub enum Failure {
         /// What runs and what is stored after the restart.
         blocks: Blocks,
     },
+    /// The program was asked to end while the MCU did not answer.
+    Interrupted,
     /// The MCU's settings are of a format that this program does not know.
     UnknownSettings,
     /// The port failed.
@@ -66,6 +68,7 @@ impl fmt::Display for Failure {
                      {checksum:08x}): it runs {active}, and has stored {stored}"
                 )
             }
+            Self::Interrupted => f.write_str("interrupted, without an answer so far"),
             Self::UnknownSettings => f.write_str("the MCU's settings are of a format that this program does not know"),
             Self::Port(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 f.write_str("the other side closed the connection")

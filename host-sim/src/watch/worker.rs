@@ -12,7 +12,7 @@ use simulation::schedule::{Reader, Schedule};
 
 use super::message::{Event, Order, Playing};
 use super::recorder::{Names, Recorder};
-use crate::link::{Client, Failure, Patience, Port, heartbeat, refusal};
+use crate::link::{Client, Failure, Patience, Port, heartbeat, not_disarmed, refusal};
 use crate::output::recording::Every;
 
 /// Pause between two attempts to connect.
@@ -406,12 +406,7 @@ impl<'a> Worker<'a> {
 
     fn name_what_stays_armed(&mut self, reason: &str) {
         if matches!(self.state, State::Armed | State::Ramping) {
-            let limit_s = f64::from(self.status.silence_limit_ticks) / f64::from(self.status.rate_hz.max(1));
-            self.outcome.failures.push(format!(
-                "{}: not disarmed: {reason}; an armed MCU ramps its voltage down by itself {limit_s} s after it last heard of \
-                 its host",
-                self.settings.port
-            ));
+            self.outcome.failures.push(not_disarmed(&self.settings.port, reason, &self.status));
         }
     }
 }

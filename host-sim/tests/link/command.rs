@@ -346,6 +346,37 @@ fn ctrl_c_ends_a_recording_with_its_summary() {
     assert_eq!(summary["rows"].as_u64().unwrap() as usize, Record::open(&out, MEASURED).unwrap().rows.len());
 }
 
+/// The MCU would ramp down by itself after a minute, and the program would give up after another.
+#[test]
+fn a_signal_disables_the_output_although_no_answer_arrives() {
+    let mcu = Mcu::on_socket(Setup { silence_ms: 60_000, ..Setup::default() });
+    for (signal, code, mute) in [("-INT", 130, true), ("-TERM", 143, true), ("-TERM", 143, false)] {
+        mcu.with(|shared| shared.changes.clear());
+        let kept = start(&mcu.port, &["set", "100", "--arm", "--keep", "inf", "--timeout", "120"]);
+        mcu.wait_for_target(100.0);
+        let before = mcu.with(|shared| {
+            shared.mute = mute;
+            shared.counters.repeated
+        });
+        // A request waits for its answer.
+        while mute && mcu.with(|shared| shared.counters.repeated == before) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(Command::new("kill").args([signal, &kept.id().to_string()]).status().unwrap().success());
+        let kept = kept.wait_with_output().unwrap();
+        let remarks = String::from_utf8(kept.stderr).unwrap();
+        assert_eq!(kept.status.code(), Some(code), "{remarks}");
+        let states: Vec<State> = mcu.with(|shared| shared.changes.iter().map(|sample| sample.state).collect());
+        assert_eq!(states, [State::Disarmed, State::Armed, State::Disarmed], "{remarks}");
+        let said = match mute {
+            true => "not disarmed: no answer to 2 requests",
+            false => "ended by a signal; the output is disabled",
+        };
+        assert!(remarks.contains(said), "{remarks}");
+        mcu.with(|shared| shared.mute = false);
+    }
+}
+
 #[test]
 fn a_lost_connection_keeps_the_rows() {
     let mcu = Mcu::on_socket(Setup { hang_up_after: Some(1500), ..Setup::default() });

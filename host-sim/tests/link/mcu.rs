@@ -87,6 +87,8 @@ pub(crate) struct Shared {
     pub(crate) interlock_open: bool,
     /// Fault that another part of the program finds in the next tick.
     pub(crate) fault: Option<supervisor::Fault>,
+    /// True if nothing that the MCU sends arrives.
+    pub(crate) mute: bool,
     /// True if the MCU is to restart at the next tick.
     pub(crate) restart: bool,
     /// Seed of the nonces since the last start.
@@ -225,6 +227,9 @@ impl Mcu {
             let mut start = Instant::now();
             let mut out = Vec::new();
             while !stop.load(Ordering::Relaxed) {
+                if chip.shared.lock().unwrap().mute {
+                    out.clear();
+                }
                 noise.spoil(&mut out);
                 let mut bytes = [0; 256];
                 let hung_up = setup.hang_up_after.is_some_and(|ticks| chip.view.sample.tick > ticks);

@@ -16,7 +16,7 @@ use simulation::bad_input;
 use simulation::schedule::Schedule;
 
 use super::schedule::{Drive, ScheduleArguments, check_schedule};
-use super::session::{Session, seconds, stop_on_interrupt, stopped};
+use super::session::{Session, seconds, stopped};
 
 /// Longest accepted capture, in s: more than any MCU has RAM for.
 const LONGEST_S: f64 = 1e6;
@@ -61,7 +61,6 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let rate_hz = session.status.rate_hz;
     let rows = (length_s * f64::from(rate_hz)).round().clamp(1.0, f64::from(u32::MAX)) as u32;
     let amplifier = amplifier_of(session)?;
-    stop_on_interrupt();
     let room = session.client.capture_state().with_context(|| name.clone())?.most;
     if rows > room {
         let (row_rate, most_s) = (f64::from(rate_hz), f64::from(room) / f64::from(rate_hz));

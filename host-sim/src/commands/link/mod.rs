@@ -40,7 +40,8 @@ a command stays connected: --keep, watch or record. A request is repeated every 
 seconds; the MCU applies it once.
 
 Exit codes: 0 success, 1 request rejected, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a \
-stiffness out of reach."
+stiffness out of reach, 128 + number after a signal: set, arm, watch, record and capture disable the output first. Ctrl-C is the usual \
+end of watch, record and --keep: exit code 0, unless a request waits for an answer."
 )]
 pub(crate) struct Arguments {
     /// A serial device, unix:PATH or tcp:HOST:PORT
@@ -177,7 +178,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let port = Port::open(&arguments.port, baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
     let mut session = Session { client, status, json };
-    match &arguments.command {
+    // The other commands leave the output as it is, and may end anywhere.
+    if let Command::Set(_) | Command::Arm { .. } | Command::Watch(_) | Command::Record(_) | Command::Capture(_) =
+        arguments.command
+    {
+        session.stop_on_signal();
+    }
+    let mut execute = || match &arguments.command {
         Command::Status => session.show_status(),
         Command::Set(set) => {
             let arms = set.arm && session.status.sample.state == link::State::Disarmed;
@@ -187,7 +194,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             let done = session.order(Request::Set(target));
             if done.is_err() && arms {
                 // What this command has armed does not stay so without the stiffness that it was armed for.
-                session.client.leave();
+                // Without its host the MCU ramps down by itself.
+                // Without its host the MCU ramps down by itself.
+                let _ = session.client.leave();
             }
             session.show_and_keep(done?, keep)
         }
@@ -223,5 +232,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Capture(arguments) => capture::run(&mut session, arguments),
         Command::Model(arguments) => model::run(&mut session, arguments, model.as_ref()),
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
-    }
+    };
+    let done = execute();
+    session.finish(done)
 }

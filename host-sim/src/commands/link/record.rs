@@ -16,7 +16,7 @@ use simulation::bad_input;
 use simulation::schedule::Schedule;
 
 use super::schedule::{Drive, ScheduleArguments, check_schedule};
-use super::session::{Session, seconds, stop_on_interrupt, stopped};
+use super::session::{Session, seconds, stopped};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -67,7 +67,6 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     }
     let length = schedule.as_ref().map(|schedule| Duration::from_secs_f64(schedule.end_s() - schedule.start_s()));
     let whole = arguments.time()?.or(length);
-    stop_on_interrupt();
     let every = Every::at(arguments.rate_hz, session.status.rate_hz, baud);
     let mut recording = Recording::new(&arguments.file, arguments.force, &session.status, every)?;
     if arguments.arm {

@@ -1,12 +1,12 @@
 //! An open connection to the MCU, and what the subcommands of `vsj link` share.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use host_sim::link::{AdaptationRow, Client, IsolationRow, StatusReport, heartbeat};
+use host_sim::link::{AdaptationRow, Client, IsolationRow, StatusReport, heartbeat, not_disarmed};
 use host_sim::output::terminal::{json, print, remark};
-use host_sim::signals::on_ctrl_c;
+use host_sim::signals::{end, on_signal};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{IsolationReport, Request, Status, WireVolts};
@@ -29,6 +29,31 @@ pub(super) struct Session {
 }
 
 impl Session {
+    /// Makes the first signal end what runs, as soon as [`stopped`] is seen, and what waits for an answer; a second one ends the program.
+    pub(super) fn stop_on_signal(&mut self) {
+        on_signal(|signal| SIGNAL.store(signal, Ordering::Relaxed));
+        self.client.interrupt_when(stopped);
+    }
+
+    /// Returns what was `done`, unless a signal has ended it: then disables the output and ends the program as the signal would. Ctrl-C
+    /// also ends commands that have no other end, which is no failure.
+    pub(super) fn finish(mut self, done: Result<()>) -> Result<()> {
+        let signal = SIGNAL.load(Ordering::Relaxed);
+        if signal == 0 || signal == CTRL_C && done.is_ok() {
+            return done;
+        }
+        if let Err(error) = done {
+            remark(&format!("{error:#}"));
+        }
+        let name = self.client.name().to_owned();
+        remark(&match self.client.leave() {
+            Ok(()) => format!("{name}: ended by a signal; the output is disabled"),
+            Err(failure) => not_disarmed(&name, &failure.to_string(), &self.status),
+        });
+        drop(self);
+        end(signal)
+    }
+
     /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
     pub(super) fn order(&mut self, request: Request) -> Result<(link::State, WireVolts)> {
         self.client.command(request)
@@ -117,7 +142,6 @@ impl Session {
     /// Stays connected for `time`; returns an error if the MCU is no longer armed.
     fn keep(&mut self, time: Option<Duration>) -> Result<()> {
         let Some(time) = time else { return Ok(()) };
-        stop_on_interrupt();
         let (start, pause) = (Instant::now(), heartbeat(&self.status));
         while start.elapsed() < time && !stopped() {
             // The answer takes its time as well.
@@ -138,15 +162,13 @@ impl Drop for Session {
     }
 }
 
-static STOP: AtomicBool = AtomicBool::new(false);
-
-/// Makes Ctrl-C set the flag read by [`stopped`]; a second Ctrl-C ends the program.
-pub(super) fn stop_on_interrupt() {
-    on_ctrl_c(|| STOP.store(true, Ordering::Relaxed));
-}
+/// Number of Ctrl-C's signal.
+const CTRL_C: i32 = 2;
+/// Number of the signal that has come, 0 for none.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
 pub(super) fn stopped() -> bool {
-    STOP.load(Ordering::Relaxed)
+    SIGNAL.load(Ordering::Relaxed) != 0
 }
 
 /// Checks a time in s that must be positive and at most `most`; an infinite one becomes the longest `Duration`.

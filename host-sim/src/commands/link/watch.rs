@@ -16,7 +16,7 @@ use link::Request;
 use serde::Serialize;
 
 use super::record::rows_hz;
-use super::session::{Session, seconds, stop_on_interrupt, stopped};
+use super::session::{Session, seconds, stopped};
 
 #[derive(Args, Debug)]
 pub(super) struct Arguments {
@@ -62,7 +62,6 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     let (every, whole) = arguments.times()?;
     let rate_hz = session.status.rate_hz;
     let mut datagrams = arguments.udp.as_deref().map(|address| Datagrams::to(address, rate_hz)).transpose()?;
-    stop_on_interrupt();
     if datagrams.is_some() {
         let Every { row_ticks, .. } = Every::at(arguments.rate_hz, rate_hz, baud);
         session.order(Request::Stream { every_ticks: row_ticks })?;
