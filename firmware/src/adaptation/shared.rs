@@ -10,8 +10,8 @@ use embassy_time::{Duration, Timer};
 use link::adaptation::Adaptation as Request;
 use link::isolation::Off;
 use link::{AdaptationReport, Reply};
-use model::adaptation::{Observation, Variant};
 
+use super::handover::Handover;
 use super::{Planner, Terms};
 use crate::control::{Control, Tick};
 use crate::isolation::Isolation;
@@ -25,15 +25,16 @@ static TERMS: OnceLock<Terms> = OnceLock::new();
 static SWITCH: Mutex<CriticalSectionRawMutex, Cell<Option<bool>>> = Mutex::new(Cell::new(None));
 /// What the adaptation does; `None` before the housekeeping task has begun.
 static LATEST: Mutex<CriticalSectionRawMutex, Cell<Option<AdaptationReport>>> = Mutex::new(Cell::new(None));
-/// What the last block has shown, and its last tick.
-static SEEN: Mutex<CriticalSectionRawMutex, Cell<Option<(Observation, u64)>>> = Mutex::new(Cell::new(None));
-/// What is exchanged at the end of the present block. Without the inner cell, which hides the unused codes of a variant, `None` would be
-/// one of them, not zero, and the flash would contain the whole variant for the start.
-static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Cell<Variant>>>> = Mutex::new(RefCell::new(None));
+static HANDOVER: Mutex<CriticalSectionRawMutex, RefCell<Handover>> = Mutex::new(RefCell::new(Handover::EMPTY));
 
 /// Sets the constant properties, once, at the start.
 pub fn set_terms(terms: Terms) {
     let _ = TERMS.init(terms);
+}
+
+/// Runs `work` on the handover, with interrupts off. Nobody else holds it then, so that there is always a result; a panic is not possible.
+fn with_handover<T>(work: impl FnOnce(&mut Handover) -> T) -> Option<T> {
+    HANDOVER.lock(|handover| handover.try_borrow_mut().ok().map(|mut handover| work(&mut handover)))
 }
 
 impl Planner {
@@ -56,17 +57,7 @@ pub fn after_tick(control: &mut Control, isolation: &mut Isolation, tick: &Tick,
     if !isolation.ends_block(tick) {
         return;
     }
-    let seen = NEXT.lock(|next| {
-        // Nobody else holds it while interrupts are off.
-        let mut next = next.try_borrow_mut().ok();
-        let variant = next.as_mut().and_then(|next| next.as_mut()).map(|next| &*next.get_mut());
-        let seen = isolation.end_block(control, tick, variant);
-        if let Some(next) = &mut next {
-            **next = None;
-        }
-        seen
-    });
-    SEEN.lock(|cell| cell.set(Some((seen, number))));
+    with_handover(|handover| handover.end_block(control, isolation, tick, number));
 }
 
 /// Switches what the host wants, plans if a block has ended, and logs what has changed.
@@ -78,13 +69,9 @@ pub fn serve(planner: &mut Planner) {
         planner.publish();
         SWITCH.lock(|cell| cell.set(None));
     }
-    let Some((seen, tick)) = SEEN.lock(Cell::take) else { return };
+    let Some((seen, tick)) = with_handover(Handover::take).flatten() else { return };
     let change = planner.plan(&seen, tick);
-    NEXT.lock(|next| {
-        if let Ok(mut next) = next.try_borrow_mut() {
-            *next = planner.next().copied().map(Cell::new);
-        }
-    });
+    with_handover(|handover| handover.put(planner.next()));
     planner.publish();
     if let Some(change) = change {
         log::adaptation(&change, tick);

@@ -9,7 +9,8 @@ use model::adaptation::{Parameters, Phase, Settings, settled_within};
 use model::isolation::Causes;
 use model::{Plant, device};
 
-use super::{Alone, Change, Terms};
+use super::handover::Handover;
+use super::{Alone, Change, Planner, Terms};
 use crate::isolation::tests::{Rig, settings};
 
 /// Tick in which the spring becomes stiffer by a tenth.
@@ -107,4 +108,26 @@ fn an_exchange_waits_for_a_loop_that_is_settled_and_moves_no_code() {
         assert!(now == exchanges || error_v <= tolerance_v, "an exchange at an error of {error_v} V");
     });
     assert!(exchanges > 5 && largest_v < 3.0, "{exchanges} exchanges, {largest_v} V");
+}
+
+/// A planner that is always late by one block, as a log that stalls makes it.
+#[test]
+fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
+    let settings = settings(Causes::NONE);
+    let mut rig = Rig::new(&settings);
+    rig.gain = 1.1;
+    let (mut planner, mut handover) = (Planner::new(terms(&settings, &rig)), Handover::EMPTY);
+    let (mut late, mut plans) = (None, 0);
+    rig.run(0, 40_000, |rig, tick, done, _| {
+        if rig.isolation.ends_block(done) {
+            handover.end_block(&mut rig.control, &mut rig.isolation, done, tick);
+            handover.put(late.as_ref());
+            let (seen, tick) = handover.take().unwrap();
+            planner.plan(&seen, tick);
+            assert_eq!(planner.report().exchanges, 0, "what runs is not what the planner takes for it");
+            late = planner.next().copied();
+            plans += u32::from(late.is_some());
+        }
+    });
+    assert!(plans > 5, "{plans}");
 }
