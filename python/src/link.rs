@@ -1,5 +1,6 @@
 //! A running MCU over its serial link, for `vsj.Link`: the client of the command `vsj link`, with heartbeats from a thread.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -117,6 +118,19 @@ pub(crate) struct Port {
     beating: Mutex<Option<JoinHandle<()>>>,
 }
 
+thread_local! {
+    /// The exception of a signal that has come while a request waited for its answer.
+    static SIGNAL: RefCell<Option<PyErr>> = const { RefCell::new(None) };
+}
+
+/// True if a signal has come for which the interpreter has an exception, as Ctrl-C has.
+fn interrupted() -> bool {
+    let signal = Python::attach(|py| py.check_signals().err());
+    let is_signalled = signal.is_some();
+    SIGNAL.set(signal);
+    is_signalled
+}
+
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -132,18 +146,25 @@ fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
         thread::park_timeout(pause);
     }
     if let Some(connection) = lock(connection).as_mut() {
-        connection.client.leave();
+        // Without its host the MCU ramps down by itself.
+        let _ = connection.client.leave();
     }
 }
 
 impl Port {
-    /// Does `work` with the connection, without the interpreter's lock.
+    /// Does `work` with the connection, without the interpreter's lock. A signal ends the wait for an answer with its exception.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Connection) -> Result<T> + Send) -> PyResult<T> {
         let done = py.detach(|| match lock(&self.connection).as_mut() {
-            Some(connection) => work(connection),
+            Some(connection) => {
+                connection.client.interrupt_when(interrupted);
+                let done = work(connection);
+                // The thread of the heartbeats never waits for the interpreter.
+                connection.client.interrupt_when(|| false);
+                done
+            }
             None => Err(anyhow::anyhow!("the link is closed")),
         });
-        done.map_err(link_exception)
+        SIGNAL.take().map_or_else(|| done.map_err(link_exception), Err)
     }
 }
 
@@ -237,6 +258,10 @@ impl Port {
                 it.client.reports().iter().map(|report| FaultRow::new(report, it.status.rate_hz)).collect();
             Ok(serde_json::to_string(&rows)?)
         })
+    }
+
+    fn dropped_samples(&self, py: Python<'_>) -> PyResult<u64> {
+        self.with(py, |it| Ok(it.client.dropped_samples()))
     }
 
     fn models(&self, py: Python<'_>, plant: Option<Plant>) -> PyResult<(String, Vec<String>)> {

@@ -2,8 +2,11 @@
 
 import os
 import re
+import signal
+import socket
 import threading
 import time
+from collections import Counter
 
 import pytest
 import vsj
@@ -25,6 +28,131 @@ def board_with_bank():
     if port is None:
         pytest.skip("no board with an isolation bank; cargo xtask clients starts one")
     return port
+
+
+# Codes of requests, see docs/link.md.
+HELLO, STATUS, ARM, DISARM, HEARTBEAT, HEARD = 0, 1, 3, 4, 6, 12
+
+
+def checksum(data):
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x82F63B78 if crc & 1 else 0)
+    return (crc ^ 0xFFFFFFFF).to_bytes(4, "little")
+
+
+def frame(sequence, message):
+    packet = b"\x05A" + sequence + message + (1).to_bytes(4, "little")
+    blocks = (packet + checksum(packet)).split(b"\0")
+    return b"\0" + b"".join(bytes([len(block) + 1]) + block for block in blocks) + b"\0"
+
+
+def number(value):
+    return bytes([value & 0x7F | 0x80]) + number(value >> 7) if value > 0x7F else bytes([value])
+
+
+def unstuffed(encoded):
+    blocks = []
+    while encoded:
+        blocks.append(encoded[1 : encoded[0]])
+        encoded = encoded[encoded[0] :]
+    return b"\0".join(blocks)
+
+
+class Mcu:
+    """An MCU within the test, which does what no healthy board does."""
+
+    def __init__(self, folder):
+        self.asked = Counter()
+        #: What is sent ahead of the answer to the next request with this code.
+        self.ahead = {}
+        #: Longest silence in ticks of 1 ms.
+        self.silence = number(60_000)
+        #: Called with the code of a request; its answer is lost unless it is true.
+        self.answers = lambda code: True
+        self.port = f"unix:{folder}/mcu"
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(f"{folder}/mcu")
+        self._listener.listen()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self):
+        connection, _ = self._listener.accept()
+        buffer = b""
+        with connection, self._listener:
+            while received := connection.recv(4096):
+                *frames, buffer = (buffer + received).split(b"\0")
+                for packet in map(unstuffed, filter(None, frames)):
+                    code = packet[4]
+                    self.asked[code] += 1
+                    if self.answers(code):
+                        connection.sendall(self.ahead.pop(code, b"") + frame(packet[2:4], self._reply(code)))
+
+    def _reply(self, code):
+        if code in (HELLO, STATUS):
+            return b"\2\0\1\0\0\0" + number(1000) + self.silence + bytes(23)
+        # What came later than the first MCUs is unknown to this one.
+        return bytes(3) if code < 18 else b"\1\7"
+
+    def wait_for(self, code, count):
+        begin = time.monotonic()
+        while self.asked[code] < count:
+            assert time.monotonic() - begin < 30, self.asked
+            time.sleep(0.005)
+
+    def ended(self):
+        self._thread.join(30)
+        assert not self._thread.is_alive()
+        return self.asked
+
+
+@pytest.fixture
+def mcu(tmp_path):
+    return Mcu(tmp_path)
+
+
+def test_ctrl_c_ends_a_call_that_waits_for_an_answer_and_the_output_is_disabled(mcu):
+    def answers(code):
+        # The third time that the request is sent.
+        if code == ARM and mcu.asked[ARM] == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return code != ARM
+
+    with pytest.raises(KeyboardInterrupt):
+        with vsj.Link(mcu.port, timeout=25) as link:
+            mcu.answers = answers
+            link.arm()
+    assert mcu.asked[ARM] < 100 and mcu.ended()[DISARM] > 0
+
+
+def test_a_fault_is_reported_once_and_the_mcu_hears_of_its_receipt(mcu):
+    with vsj.Link(mcu.port, timeout=25) as link:
+        mcu.ahead[ARM] = 2 * frame(bytes(2), bytes([5, 1, 7, 4, 0b1000, 0]))
+        link.arm()
+        [fault] = link.faults()
+        assert (fault["fault"], fault["fault_code"], fault["tick"], fault["time_s"]) == ("interlock", 4, 7, 0.007)
+        assert fault["standing"] == ["interlock"] and link.faults() == []
+    assert mcu.ended()[HEARD] == 1
+
+
+def test_the_heartbeats_follow_a_silence_limit_that_has_become_shorter(mcu):
+    with vsj.Link(mcu.port, timeout=25) as link:
+        # With the first limit they would take a minute.
+        mcu.silence = number(20)
+        link.status()
+        mcu.wait_for(HEARTBEAT, 60)
+    mcu.ended()
+
+
+def test_the_oldest_samples_that_nobody_takes_are_dropped_and_counted(mcu):
+    with vsj.Link(mcu.port, timeout=25) as link:
+        mcu.ahead[ARM] = frame(bytes(2), b"\x03" + bytes(10)) * (65_536 + 3)
+        link.arm()
+        assert link.dropped_samples() == 3
+    mcu.ended()
 
 
 def test_a_port_that_is_none_is_bad_input_with_the_words_of_the_command(command):

@@ -188,6 +188,10 @@ class Link:
         """
         return json.loads(self._port.faults())
 
+    def dropped_samples(self) -> int:
+        """Number of samples of ``watch`` that were dropped because they were not taken: all but the newest 65 536."""
+        return self._port.dropped_samples()
+
     def watch(self, rate_hz: float = 100.0, seconds: Optional[float] = None) -> Iterator[Sample]:
         """Iterate over samples as they arrive, until ``seconds`` have passed or the loop is left.
 
