@@ -189,6 +189,23 @@ fn an_open_interlock_and_its_fault() {
 }
 
 #[test]
+fn set_with_arm_leaves_the_output_as_it_was_if_the_mcu_refuses_one_of_the_two() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let port = &mcu.port;
+    mcu.with(|shared| shared.interlock_open = true);
+    assert!(bad(1, port, &["set", "300", "--arm"]).contains("refused: the interlock is open"));
+    let ordered: Vec<_> = mcu.with(|shared| shared.ordered.iter().map(|command| command.arming).collect());
+    assert_eq!(ordered, [Some(supervisor::Command::Arm)], "no target follows a refused arm");
+    mcu.with(|shared| shared.interlock_open = false);
+    let state = || mcu.with(|shared| shared.sample.state);
+    assert!(bad(2, port, &["set", "701", "--arm"]).contains("out of range: expected 0 to 700 V"));
+    assert_eq!(state(), State::Disarmed, "what this command has armed");
+    good(port, &["set", "300", "--arm"]);
+    assert!(bad(2, port, &["set", "701", "--arm"]).contains("out of range"));
+    assert_eq!((state(), mcu.with(|shared| shared.sample.target.to_f64())), (State::Armed, 300.0), "armed before");
+}
+
+#[test]
 fn an_acknowledgement_without_a_fault_says_that_there_was_none() {
     let mcu = Mcu::on_socket(Setup::default());
     let nothing = "no fault stands, so none was acknowledged";
