@@ -557,7 +557,7 @@ public:
         beating_ = std::thread([this] { heartbeats(); });
     }
 
-    /// Disarms the microcontroller and closes the port.
+    /// Disarms the microcontroller and closes the port; not one that another program commands by now.
     ~Link() {
         {
             const std::lock_guard<std::mutex> guard(closing_lock_);
@@ -565,6 +565,13 @@ public:
         }
         wake_.notify_all();
         beating_.join();
+        try {
+            // A disarm is carried out whoever sends it.
+            order({6});
+        } catch (const NoSession&) {
+            return;
+        } catch (const Error&) {
+        }
         try {
             disarm();
         } catch (const Error&) {
@@ -693,6 +700,10 @@ public:
 
 private:
     using Lock = std::lock_guard<std::recursive_mutex>;
+    /// A request that was refused because it belongs to no session, or to another one.
+    struct NoSession : Error {
+        using Error::Error;
+    };
     /// A request is repeated after this time.
     static constexpr std::chrono::milliseconds each{100};
     /// Requests after which a new session begins: a session has 65 536 numbers.
@@ -907,7 +918,9 @@ private:
             case 19: why = "the supply of the MCU's converters is out of its range"; break;
             default: why = "reason " + std::to_string(code) + " of docs/link.md"; break;
         }
-        throw Error(port_.name() + ": refused: " + why);
+        const std::string refusal = port_.name() + ": refused: " + why;
+        if (code == 4 || code == 18) throw NoSession(refusal);
+        throw Error(refusal);
     }
 };
 

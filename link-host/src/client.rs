@@ -70,8 +70,8 @@ pub const MOST_SAMPLES: usize = 1 << 16;
 /// Requests after which a client begins a new session: a session has 65 536 numbers.
 const MOST_REQUESTS: u16 = 60_000;
 
-/// Longest wait for the answer to the last request.
-const LEAVING: Duration = Duration::from_millis(200);
+/// Longest wait for the answer to each of the last two requests: an armed MCU takes a host on a slower line for silent.
+const LEAVING: Duration = Duration::from_millis(500);
 
 /// Largest number of times that a request is sent by a program that is to end: enough for an answer on a bad line.
 const LAST_TRIES: u32 = 3;
@@ -170,7 +170,7 @@ impl Client {
     /// # Errors
     /// [`Failure`] if the MCU has not confirmed it; without its host it ramps down by itself.
     pub fn leave(&mut self) -> Result<(), Failure> {
-        self.patience = Patience::of(LEAVING);
+        (self.patience, self.interrupted) = (Patience::of(LEAVING), || false);
         match self.exchange(Request::Heartbeat) {
             Err(failure @ Failure::Refused(Reason::OtherSession | Reason::HelloFirst)) => Err(failure),
             _ => self.exchange(Request::Disarm).map(drop),

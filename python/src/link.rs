@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
-use link_host::{Client, Failure, FaultRow, IsolationRow, Patience, Row, StatusReport, heartbeat};
+use link_host::{Client, Failure, FaultRow, IsolationRow, Patience, Row, StatusReport, heartbeat, not_disarmed};
 use pyo3::prelude::*;
 use serde_json::json;
 use simulation::settings_file::{SettingsFile, Source};
@@ -115,7 +115,7 @@ impl Connection {
 pub(crate) struct Port {
     connection: Arc<Mutex<Option<Connection>>>,
     closing: Arc<AtomicBool>,
-    beating: Mutex<Option<JoinHandle<()>>>,
+    beating: Mutex<Option<JoinHandle<Option<Failure>>>>,
 }
 
 thread_local! {
@@ -135,8 +135,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sends heartbeats until the port is closed, then disables the output; a lost connection is reported by the next call.
-fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
+/// Sends heartbeats until the port is closed, then disables the output; a lost connection is reported by the next call. Returns why the
+/// output may still be enabled: of an MCU that has restarted it is not, and that of another program is not touched.
+fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) -> Option<Failure> {
     while !closing.load(Ordering::Relaxed) {
         let mut pause = TURN;
         if let Some(connection) = lock(connection).as_mut() {
@@ -145,10 +146,8 @@ fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) {
         }
         thread::park_timeout(pause);
     }
-    if let Some(connection) = lock(connection).as_mut() {
-        // Without its host the MCU ramps down by itself.
-        let _ = connection.client.leave();
-    }
+    let left = lock(connection).as_mut()?.client.leave();
+    left.err().filter(|failure| !matches!(failure, Failure::Refused(Reason::OtherSession | Reason::HelloFirst)))
 }
 
 impl Port {
@@ -272,16 +271,16 @@ impl Port {
         self.with(py, |it| it.settings(path))
     }
 
-    /// Disables the output, ends the heartbeats and closes the port.
-    fn close(&self, py: Python<'_>) {
+    /// Disables the output, ends the heartbeats and closes the port. Returns what is to be said if the MCU has not confirmed it.
+    fn close(&self, py: Python<'_>) -> Option<String> {
         py.detach(|| {
             self.closing.store(true, Ordering::Relaxed);
-            if let Some(beating) = lock(&self.beating).take() {
-                beating.thread().unpark();
-                let _ = beating.join();
-            }
-            drop(lock(&self.connection).take());
-        });
+            let beating = lock(&self.beating).take()?;
+            beating.thread().unpark();
+            let failure = beating.join().unwrap_or_default();
+            let connection = lock(&self.connection).take()?;
+            failure.map(|failure| not_disarmed(&connection.name(), &failure.to_string(), &connection.status))
+        })
     }
 }
 

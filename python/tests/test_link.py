@@ -72,6 +72,8 @@ class Mcu:
         self.silence = number(60_000)
         #: Called with the code of a request; its answer is lost unless it is true.
         self.answers = lambda code: True
+        #: Whether each request is refused as of another session.
+        self.refuses = False
         self.port = f"unix:{folder}/mcu"
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(f"{folder}/mcu")
@@ -94,6 +96,8 @@ class Mcu:
     def _reply(self, code):
         if code in (HELLO, STATUS):
             return b"\2\0\1\0\0\0" + number(1000) + self.silence + bytes(23)
+        if self.refuses:
+            return b"\1\x12"
         # What came later than the first MCUs is unknown to this one.
         return bytes(3) if code < 18 else b"\1\7"
 
@@ -136,6 +140,17 @@ def test_a_fault_is_reported_once_and_the_mcu_hears_of_its_receipt(mcu):
         assert (fault["fault"], fault["fault_code"], fault["tick"], fault["time_s"]) == ("interlock", 4, 7, 0.007)
         assert fault["standing"] == ["interlock"] and link.faults() == []
     assert mcu.ended()[HEARD] == 1
+
+
+def test_the_output_of_another_program_is_left_and_one_that_may_be_enabled_is_an_error(mcu, tmp_path):
+    with vsj.Link(mcu.port, timeout=25):
+        mcu.refuses = True
+    assert mcu.ended()[DISARM] == 0
+    mute = Mcu(tmp_path / "..")
+    with pytest.raises(vsj.LinkError, match="not disarmed: no answer to 5 requests.* ramps its voltage down by itself 60 s"):
+        with vsj.Link(mute.port, timeout=25):
+            mute.answers = lambda code: False
+    assert mute.ended()[DISARM] == 5
 
 
 def test_the_heartbeats_follow_a_silence_limit_that_has_become_shorter(mcu):

@@ -135,10 +135,8 @@ class Link:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        try:
-            self.disarm()
-        finally:
-            self.close()
+        if not_disarmed := self._port.close():
+            raise _vsj.LinkError(not_disarmed)
 
     def close(self) -> None:
         """Disable the output, end the heartbeats and close the port."""

@@ -156,6 +156,13 @@ void samples_that_nobody_takes() {
     expect(mcu.asked[heard] == 1, "a report whose receipt the MCU knows of");
 }
 
+/// A disarm is carried out whoever sends it.
+void output_of_another_program() {
+    Mcu mcu;
+    with_link(mcu, [&](vsj::Link&) { mcu.is_of_another_session = true; });
+    expect(mcu.asked[disarm] == 0, "no disarm of another program's output");
+}
+
 /// A session has 65 536 numbers; refusals as of another session use none.
 void numbers_that_run_out() {
     Mcu mcu;
@@ -238,6 +245,7 @@ int main() {
     all_addresses_of_a_name();
     flags_of_a_serial_device();
     samples_that_nobody_takes();
+    output_of_another_program();
     numbers_that_run_out();
-    std::puts("dropped samples counted, a session renewed, a serial device set, every address tried");
+    std::puts("dropped samples counted, another program's output left, a session renewed, a serial device set, every address tried");
 }

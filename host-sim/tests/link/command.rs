@@ -386,7 +386,7 @@ fn a_signal_disables_the_output_although_no_answer_arrives() {
         let states: Vec<State> = mcu.with(|shared| shared.changes.iter().map(|sample| sample.state).collect());
         assert_eq!(states, [State::Disarmed, State::Armed, State::Disarmed], "{remarks}");
         let said = match mute {
-            true => "not disarmed: no answer to 2 requests",
+            true => "not disarmed: no answer to 5 requests",
             false => "ended by a signal; the output is disabled",
         };
         assert!(remarks.contains(said), "{remarks}");
