@@ -175,7 +175,7 @@ impl Script {
 
     /// The script with this name, see the table of this module; `None` if there is none.
     pub fn parse(name: &str) -> Option<Self> {
-        let name = name.trim();
+        let name = name.trim_ascii();
         if name == "stair" {
             return Some(Self::Stair);
         }

@@ -70,7 +70,7 @@ fn main() -> ! {
     let mut buffer = [0; 64];
     let name = semihosting::command_line(&mut buffer);
     let mode = match (cause.fault, Script::parse(name)) {
-        _ if name.trim() == LINK => Mode::Link,
+        _ if name.trim_ascii() == LINK => Mode::Link,
         (Some(_), _) => Mode::Play(Script::Aftermath),
         (None, Some(script)) => Mode::Play(script),
         (None, None) => semihosting::exit(EXIT_NO_SCRIPT),
