@@ -409,7 +409,7 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     for finding in &mut report.findings {
         finding.rmse_before = finding.rmse_before.min(report.baseline.rmse).max(finding.rmse_after);
     }
-    let undetected = credibility::undetected(without.data.rows(), report.verdict == Verdict::Unexplained);
+    let undetected = credibility::undetected(&without.observed, report.verdict == Verdict::Unexplained);
     credibility::with_unknown_laws(&mut report.findings, diagnosis::power(&without.data.reading), undetected);
     if let Some(alone) = credibility::likely_alone(&report.findings).filter(|_| report.verdict == Verdict::Explained) {
         report.verdict = Verdict::Ambiguous;

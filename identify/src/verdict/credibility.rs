@@ -23,6 +23,7 @@
 //! So do causes that are each likely, if the product of their probabilities is below [`LIKELY_TOGETHER`].
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
+use crate::record::observed::Observed;
 use crate::stats::thresholds::empirical::{
     IF_IDENTIFIED, IF_SPOILING, IF_UNEXPLAINED, ROWS_THAT_DETECT, UNKNOWN_FORM, UNKNOWN_NOISE,
 };
@@ -44,10 +45,11 @@ const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series
 /// Causes that are linear dynamics of the spring, of which an identified one has its own.
 const LINEAR: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
 
-/// Returns the mean square error that a wrong form may remove of an unknown law without leaving structure that shows in a record of this
-/// many rows, relative to the mean square that is left; infinite if structure shows.
-pub(crate) fn undetected(rows: usize, is_structured: bool) -> f64 {
-    if is_structured { f64::INFINITY } else { (ROWS_THAT_DETECT.get() / rows as f64).max(1.0) }
+/// Returns the mean square error that a wrong form may remove of an unknown law without leaving structure that shows in these readings,
+/// relative to the mean square that is left; infinite if structure shows, and if readings are intervals, in which errors do not.
+pub(crate) fn undetected(observed: &Observed, is_structured: bool) -> f64 {
+    let hides_all = is_structured || observed.intervals() > 0;
+    if hides_all { f64::INFINITY } else { (ROWS_THAT_DETECT.get() / observed.kinds.len() as f64).max(1.0) }
 }
 
 /// Lowers probabilities by the chance that a law which no cause describes is behind a finding; `power` is the mean square of the readings
@@ -185,6 +187,11 @@ fn lower(finding: &mut Finding, factor: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::data::Data;
+    use crate::record::input::Input;
+    use crate::record::observed::Kind;
+    use crate::stats::scale::normals;
+    use simulation::record::{Record, Row};
 
     /// A finding that removes errors down to 1 V.
     fn finding(cause: &'static str, before: f64) -> Finding {
@@ -225,8 +232,16 @@ mod tests {
         };
         assert!(second(f64::INFINITY, 3.0) < 0.1 && second(1.0, 3.0) > 0.85 && second(1.0, 1.1) < 0.2);
         // A few rows hide more, and structure is the sign of a form that is wrong.
-        assert_eq!([undetected(100_000, false), undetected(500, true)], [1.0, f64::INFINITY]);
-        assert!(second(undetected(100, false), 3.0) < 0.3);
+        let observed = |rows: usize| {
+            let row = |(line, noise)| Row { line, time_s: line as f64, voltage_v: 100.0, measured: Some(noise) };
+            let rows = normals(rows).into_iter().enumerate().map(row).collect();
+            Observed::new(&Data::new(&Record { name: String::new(), rows }, Input::Hold))
+        };
+        let cases = [(4000, false), (4000, true), (500, false)];
+        assert_eq!(cases.map(|(rows, is)| undetected(&observed(rows), is)), [1.0, f64::INFINITY, 4.0]);
+        assert!(second(undetected(&observed(100), false), 3.0) < 0.3);
+        let reports = Observed { kinds: vec![Kind::Unreported(1.0); 4000], ..observed(4000) };
+        assert_eq!(undetected(&reports, false), f64::INFINITY);
     }
 
     /// The simulation was 1000 times too large.

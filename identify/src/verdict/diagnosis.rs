@@ -118,7 +118,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
 
     let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let mut findings = findings(engine, &found);
-    let undetected = credibility::undetected(data.rows(), structured || !spoiling.is_empty() || unfinished);
+    let is_structured = structured || !spoiling.is_empty() || unfinished;
+    let undetected = credibility::undetected(observed, is_structured);
     credibility::with_unknown_laws(&mut findings, power(&data.reading), undetected);
     if data.normalisation.decays {
         credibility::of_slow(&mut findings);
