@@ -1,4 +1,4 @@
-//! A sensor that sticks, or whose wire is loose, is named, and what the spring hides is found beside it.
+//! A sensor that sticks, or whose wire is loose, is named, and so is the error of the spring in the same record.
 
 use std::ops::Range;
 

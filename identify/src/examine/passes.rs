@@ -76,7 +76,7 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     withhold(&mut found.report, options);
     hypothesise(&mut found, &records[0], options, judge);
     if let Some(held) = &held {
-        add_held(&mut found.report, held, &options.units);
+        add_held(&mut found, record, held, options.input, &options.units);
     }
     Ok(found)
 }

@@ -89,14 +89,14 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
-        add_held(&mut joint.report, shared, &options.units);
+        add_held(&mut joint, &records[0], shared, options.input, &options.units);
     }
     for (index, (alone, held)) in each.into_iter().zip(&held).enumerate() {
         let record = &records[index];
         let mut alone = alone.without_rivals(std::slice::from_ref(record));
         let offset = joint.zero_offsets[index] + alone.zero_offsets[0];
         if let Some(held) = held {
-            add_held(&mut alone.report, held, &options.units);
+            add_held(&mut alone, record, held, options.input, &options.units);
         }
         joint.report.complete &= alone.report.complete;
         let of = of_record(&joint, &alone, &record.name, offset);

@@ -35,8 +35,8 @@ pub(super) fn left_out(readings: &[FarReading], units: &Units) -> String {
 /// The remark on a number of readings that were held.
 pub(super) fn held(readings: usize) -> String {
     format!(
-        "{readings} readings repeat the one before, to the last digit, because no new one was taken or sent; they are left out of the model and \
-         of its errors."
+        "{readings} readings repeat the one before, to the last digit, because no new one was taken or sent, or the sensor was stuck; they are \
+         left out of the model and of its errors."
     )
 }
 

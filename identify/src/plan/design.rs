@@ -11,7 +11,8 @@ use crate::plan::library::Random;
 use crate::record::data::Data;
 
 /// Causes of one record's readings, which no voltage of another record shows.
-const OF_THE_READINGS: [&str; 5] = ["hum", "reading-offset", "sensor-saturation", "quantisation", "outliers"];
+const OF_THE_READINGS: [&str; 6] =
+    ["hum", "reading-offset", "sensor-saturation", "quantisation", "stuck-sensor", "outliers"];
 /// Causes that any explanation may hide a part of another one in: gain, time constant, instantaneous share.
 const BENDING: [&str; 3] = ["gain-error", "time-constant", "instantaneous-share"];
 /// Standard deviation of the parameters of such causes before the experiment: a factor of 1.5, and half a share.

@@ -1,5 +1,5 @@
 //! Readings that repeat the one before because no new one was taken or sent: a lossy link, a sample-and-hold, a sensor that reports
-//! changes only, or one that is stuck for a while ([`stuck`]).
+//! changes only, or one that is stuck for a while.
 //!
 //! Continuous noise does not give the same number twice, and readings on a coarse grid return to the number before last. Readings
 //! that repeat but do not return were held. They say nothing new, so that a record is diagnosed without them; only if a sensor reports
@@ -133,7 +133,7 @@ pub fn held(record: &Record) -> Option<Held> {
 /// list; `None` if it does not, or the sensor was stuck for a while.
 fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<usize>)> {
     let reading = |row: usize| rows[row].2;
-    let [low, high] = range(rows);
+    let [low, high] = range(&rows.iter().map(|(_, _, value)| *value).collect::<Vec<_>>());
     let equal = |one: f64, other: f64| (one - other).abs() <= ROUNDING * (high - low);
     let repeats = |row: usize| row > 0 && equal(reading(row), reading(row - 1));
     // A sensor at its bound and a spring at rest repeat readings as well.
@@ -151,17 +151,16 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
     let stays = |value: f64| bounds.iter().chain(&[0.0]).any(|&special| equal(value, special));
     let new: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || stays(reading(row))).collect();
     let count = rows.len() - new.len();
-    let lengths: Vec<f64> = new.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
-    if lengths.iter().any(|length| length - 1.0 > LARGEST_RUN * count as f64) {
+    let ends = new.iter().skip(1).copied().chain([rows.len()]);
+    if new.iter().zip(ends).any(|(from, to)| (to - from - 1) as f64 > LARGEST_RUN * count as f64) {
         return None;
     }
     Some((reason(rows, &new, &changes(&values)), new))
 }
 
-/// Returns the smallest and the largest of some readings.
-pub(super) fn range(rows: &[(usize, f64, f64)]) -> [f64; 2] {
-    rows.iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &(_, _, value)| [low.min(value), high.max(value)])
+/// Returns the smallest and the largest of some values.
+pub(super) fn range(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
 /// Returns the sizes of the changes between new readings under a voltage that rests, those after held readings or those without any.

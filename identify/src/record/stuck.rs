@@ -1,16 +1,22 @@
-//! A sensor that is stuck: it repeats one reading for a while, to the last digit, among readings that hardly ever do.
+//! A sensor that is stuck: it repeats one reading for a while, to the last digit, although the response changes.
 //!
-//! Noise does not give the same number many times in a row. Runs of equal readings are those of a stuck sensor if all other runs are far
-//! shorter, and if chance would not make one as long. A spring at rest in a simulation without noise repeats its reading as well: its
-//! readings do not turn back while the voltage rests, or most of its rests end with equal readings. A bound that a reading reaches
-//! gradually is that of its range; only a jump to it and back from it is a fault, or a bound that is reached once by a sensor that sticks
-//! elsewhere.
+//! A spring at rest repeats its reading as well if there is no noise, or less than a step of the sensor. So equal readings alone prove
+//! nothing. A run of them is a fault of the sensor if it is far longer than all others, more than chance makes, and
+//!
+//! - is preceded and followed by noise while the voltage rests, or
+//! - ends with a jump although the voltage has rested, as the reading catches up with the response, or
+//! - began before a change of the voltage after which the readings move elsewhere;
+//!
+//! or if the readings jump to one value and back from it by more than they ever change, while the voltage rests: a loose contact. With
+//! noise a bound of the sensor is reached again and again, and left as the response changes: at an end of the range, or at 0, a run that
+//! is the only one there and ends while the voltage rests proves a fault, or one of a sensor that sticks elsewhere.
 
 use std::ops::Range;
 
 use simulation::record::Record;
 
 use crate::record::held::{FEWEST_NEW, ROUNDING, TURNING, range};
+use crate::stats::median::median;
 use crate::stats::thresholds::empirical::{FEWEST_TIES, LEAST_HELD, SHORTEST_RUN};
 
 /// Largest length of the other runs, relative to the shortest one of a stuck sensor.
@@ -19,51 +25,184 @@ const OTHERS: f64 = 1.0 / 3.0;
 const BY_CHANCE: f64 = 1e-6;
 /// Part of the changes under a voltage that rests that turn back, from which readings have noise; of white noise two thirds do.
 const NOISY: f64 = 0.05;
-/// Shortest rest of the voltage in which a spring without noise may come to rest, in rows.
+/// Smallest change of the voltage that counts, relative to its range.
+const CHANGE: f64 = 0.1;
+/// Rows around a jump in which the voltage has to rest.
+const MARGIN: usize = 2;
+/// Smallest jump of a reading that catches up, and smallest movement after a change of the voltage, in median changes from row to row.
+const MOVES: f64 = 5.0;
+/// Rows after a jump in which the reading may not return: one that does was an outlier.
+const AFTER: usize = 3;
+/// Rows before a run and after it that show noise, and their least range in smallest changes: a coarse reading changes by one or two.
+const BESIDE: usize = 6;
+const LEAST_RANGE: f64 = 3.0;
+/// Shortest rest of the voltage in which a spring without noise may come to rest, in rows, and fewest rests that show that it does not.
 const REST: usize = 10;
+const FEWEST_RESTS: usize = 2;
+/// Fewest places elsewhere that show how the readings move.
+const FEWEST_PLACES: usize = 5;
 
-/// Returns the places of the readings, each a row, a time in s and a value, that a stuck sensor did not repeat; `None` if it was not stuck.
+/// Readings of a record with what is typical of those that are not equal to their neighbours.
+struct Readings {
+    value: Vec<f64>,
+    voltage: Vec<f64>,
+    /// Largest difference of equal readings.
+    rounding: f64,
+    /// Smallest change of the voltage that counts, in V.
+    change_v: f64,
+    /// True for a reading that belongs to no run of [`FEWEST_TIES`] or more.
+    free: Vec<bool>,
+    /// Smallest change from one free reading to the next that is not 0, median and largest one.
+    smallest: f64,
+    typical: f64,
+    largest: f64,
+    /// True if most of the rests of the voltage, and at least two, end with free readings: without noise, a spring comes to rest in them.
+    noisy_rests: bool,
+}
+
+/// Returns the places of the readings, each a row, a time in s and a value, that are not those of a stuck sensor; `None` if it was not
+/// stuck. The reading that is repeated is a good one, unless the readings jump to it.
 pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<usize>> {
-    let [low, high] = range(rows);
-    let equal = |one: f64, other: f64| (one - other).abs() <= ROUNDING * (high - low);
-    let runs = runs(rows.len(), |row| equal(rows[row].2, rows[row - 1].2));
-    let shortest = shortest_stuck(&runs)?;
-    let (long, others): (Vec<_>, Vec<_>) = runs.into_iter().partition(|run| run.len() >= shortest);
-    let free: Vec<usize> = others.into_iter().flatten().collect();
-    let is_free = |row: usize| free.binary_search(&row).is_ok();
-    let rests = runs_of_voltage(record, rows);
-    let ends: Vec<usize> = rests.iter().filter(|rest| rest.len() >= REST).map(|rest| rest.end - 1).collect();
-    let quiet = ends.iter().filter(|&&end| !is_free(end)).count();
-    let change = |row: usize| rows[row].2 - rows[row - 1].2;
-    let turns = |within: &Range<usize>| {
-        let triples = (within.start + 2..within.end).filter(|&row| (row - 2..=row).all(is_free));
-        triples.map(|row| change(row) * change(row - 1) < 0.0).collect::<Vec<_>>()
-    };
-    let at_rest: Vec<bool> = rests.iter().flat_map(turns).collect();
-    // A voltage that never rests keeps no spring at rest either.
-    let (turns, least) = if at_rest.len() < FEWEST_NEW { (turns(&(0..rows.len())), TURNING) } else { (at_rest, NOISY) };
-    let turning = turns.iter().filter(|turns| **turns).count() as f64;
-    if turns.len() < FEWEST_NEW || turning < least * turns.len() as f64 || 2 * quiet > ends.len() {
-        return None;
-    }
-    let neighbours = free.windows(2).filter(|pair| pair[1] == pair[0] + 1);
-    let largest = neighbours.map(|pair| change(pair[1]).abs()).fold(0.0, f64::max);
-    let jumps = |row: usize| row < rows.len() && change(row).abs() > largest;
-    let value = |row: usize| rows[row].2;
-    let is_special = |run: &Range<usize>| [low, high, 0.0].iter().any(|special| equal(value(run.start), *special));
+    let value: Vec<f64> = rows.iter().map(|(_, _, value)| *value).collect();
+    let voltage: Vec<f64> = rows.iter().map(|(row, _, _)| record.rows[*row].voltage_v).collect();
+    let [low, high] = range(&value);
+    let rounding = ROUNDING * (high - low);
+    let runs = runs(value.len(), |row| (value[row] - value[row - 1]).abs() <= rounding);
+    let readings = Readings::of(value, voltage, rounding, &runs)?;
+    // The first readings may be those of a spring at rest in a simulation.
+    let (jumped, others): (Vec<_>, Vec<_>) =
+        runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
+    let shortest = shortest_stuck(&others);
+    let stays =
+        |run: &Range<usize>| readings.is_among_noise(run) || readings.catches_up(run) || readings.stays_behind(run);
+    let long = others.into_iter().filter(|run| shortest.is_some_and(|shortest| run.len() >= shortest));
+    let long: Vec<Range<usize>> = if readings.have_noise() { long.filter(stays).collect() } else { Vec::new() };
+    let is_special = |run: &Range<usize>| [low, high, 0.0].iter().any(|special| readings.equal(run.start, *special));
+    let sticks = !long.iter().all(is_special);
     // With noise, a bound is reached again and again.
-    let begins = |at: f64| (1..rows.len()).filter(|&row| equal(value(row), at) && !equal(value(row - 1), at)).count();
-    let sticks = long.iter().any(|run| run.start > 0 && !is_special(run));
     let is_stuck = |run: &Range<usize>| {
-        !is_special(run)
-            || sticks && begins(value(run.start)) < FEWEST_TIES.count()
-            || jumps(run.start) && (run.end == rows.len() || jumps(run.end))
+        let is_left_at_rest = readings.is_among_noise(run) || readings.catches_up(run);
+        !is_special(run) || (sticks || is_left_at_rest) && readings.begins(run) < FEWEST_TIES.count()
     };
-    // The first readings may be those of a spring at rest in a simulation. The reading that is repeated is a good one, or one of a jump.
-    let stuck = long.into_iter().filter(|run| run.start > 0 && is_stuck(run));
-    let stuck: Vec<Range<usize>> = stuck.map(|run| run.start + usize::from(!jumps(run.start))..run.end).collect();
-    let new = (0..rows.len()).filter(|row| !stuck.iter().any(|run| run.contains(row))).collect();
-    (!stuck.is_empty()).then_some(new)
+    let repeated = long.into_iter().filter(is_stuck).map(|run| run.start + 1..run.end);
+    let faulty: Vec<Range<usize>> = jumped.into_iter().chain(repeated).collect();
+    let mut is_faulty = vec![false; rows.len()];
+    faulty.iter().for_each(|run| is_faulty[run.clone()].fill(true));
+    (!faulty.is_empty()).then(|| (0..rows.len()).filter(|&row| !is_faulty[row]).collect())
+}
+
+impl Readings {
+    /// `None` if too few of them are free to say how the others behave.
+    fn of(value: Vec<f64>, voltage: Vec<f64>, rounding: f64, runs: &[Range<usize>]) -> Option<Self> {
+        let mut free = vec![true; value.len()];
+        runs.iter().filter(|run| run.len() >= FEWEST_TIES.count()).for_each(|run| free[run.clone()].fill(false));
+        let neighbours = (1..value.len()).filter(|&row| free[row - 1] && free[row]);
+        let mut changes: Vec<f64> = neighbours.map(|row| (value[row] - value[row - 1]).abs()).collect();
+        if changes.len() < FEWEST_NEW.max(value.len() / 2) {
+            return None;
+        }
+        let largest = changes.iter().copied().fold(0.0, f64::max);
+        let smallest = changes.iter().copied().filter(|change| *change > rounding).fold(f64::INFINITY, f64::min);
+        let typical = median(&mut changes)?;
+        let [low, high] = range(&voltage);
+        let rests = self::runs(voltage.len(), |row| voltage[row] == voltage[row - 1]);
+        let ends = rests.iter().filter(|rest| rest.len() >= REST).map(|rest| free[rest.end - 1]);
+        let (noisy, quiet): (Vec<bool>, Vec<bool>) = ends.partition(|free| *free);
+        let noisy_rests = noisy.len() >= FEWEST_RESTS && noisy.len() > quiet.len();
+        Some(Self {
+            change_v: CHANGE * (high - low),
+            value,
+            voltage,
+            rounding,
+            free,
+            smallest,
+            typical,
+            largest,
+            noisy_rests,
+        })
+    }
+
+    fn equal(&self, row: usize, value: f64) -> bool {
+        (self.value[row] - value).abs() <= self.rounding
+    }
+
+    fn change(&self, row: usize) -> f64 {
+        self.value[row] - self.value[row - 1]
+    }
+
+    /// Number of runs with the value of this one.
+    fn begins(&self, run: &Range<usize>) -> usize {
+        let value = self.value[run.start];
+        (1..self.value.len()).filter(|&row| self.equal(row, value) && !self.equal(row - 1, value)).count()
+    }
+
+    /// True if the voltage rests in some rows, of those that exist.
+    fn rests(&self, rows: Range<usize>) -> bool {
+        let within = &self.voltage[rows.start..rows.end.min(self.voltage.len())];
+        let [low, high] = range(within);
+        high - low <= self.change_v
+    }
+
+    /// True if noise shows: readings turn back under a voltage that rests, or often if it never does.
+    fn have_noise(&self) -> bool {
+        let triples = (2..self.value.len()).filter(|&row| self.free[row - 2..=row].iter().all(|free| *free));
+        let rests = |row: &usize| self.voltage[row - 2..=*row].iter().all(|volts| *volts == self.voltage[*row]);
+        let (at_rest, others): (Vec<usize>, Vec<usize>) = triples.partition(rests);
+        let (rows, least) = if at_rest.len() < FEWEST_NEW { (others, TURNING) } else { (at_rest, NOISY) };
+        let turns = rows.iter().filter(|&&row| self.change(row) * self.change(row - 1) < 0.0).count();
+        turns as f64 > least * rows.len() as f64
+    }
+
+    /// True if the readings jump to the run and back from it, by more than they change elsewhere, while the voltage rests.
+    fn jump(&self, run: &Range<usize>) -> bool {
+        let jumps = |row: usize| {
+            self.change(row).abs() > self.largest && self.rests(row.saturating_sub(MARGIN)..row + MARGIN + 1)
+        };
+        jumps(run.start) && (run.end == self.value.len() || jumps(run.end))
+    }
+
+    /// True if there is noise before the run and after it, under the same voltage; if this changes with the end of the run, noise in other
+    /// rests of the voltage stands for that after it.
+    fn is_among_noise(&self, run: &Range<usize>) -> bool {
+        let before = run.start.saturating_sub(BESIDE)..run.start;
+        let after = run.end..(run.end + BESIDE).min(self.value.len());
+        let has_noise = |rows: &Range<usize>| {
+            let turns = |row: usize| self.change(row) * self.change(row - 1) < 0.0;
+            let [low, high] = range(&self.value[rows.clone()]);
+            rows.len() == BESIDE
+                && self.free[rows.clone()].iter().all(|free| *free)
+                && (rows.start + 2..rows.end).any(turns)
+                && high - low > self.typical.max(LEAST_RANGE * self.smallest)
+        };
+        let ends_with_rest = after.is_empty() || !self.rests(run.end - 1..run.end + 1);
+        let is_followed =
+            if ends_with_rest { self.noisy_rests } else { self.rests(run.start..after.end) && has_noise(&after) };
+        self.rests(before.start..run.end) && has_noise(&before) && is_followed
+    }
+
+    /// True if the run ends with a jump, and not with an outlier, after the voltage has rested for half of it.
+    fn catches_up(&self, run: &Range<usize>) -> bool {
+        let after = run.end + 1..(run.end + 1 + AFTER).min(self.value.len());
+        run.end < self.value.len()
+            && self.change(run.end).abs() > MOVES * self.typical
+            && self.rests(run.start + run.len() / 2..run.end + 1)
+            && after.into_iter().all(|row| (self.value[row] - self.value[run.start]).abs() > self.typical)
+    }
+
+    /// True if the voltage changes in the first half of the run, and the readings elsewhere move in as many rows after such a change.
+    fn stays_behind(&self, run: &Range<usize>) -> bool {
+        let differs = |from: usize, to: usize| (self.voltage[to] - self.voltage[from]).abs() > self.change_v;
+        let Some(changed) = (run.start..run.start + run.len() / 2).find(|&row| differs(run.start, row)) else {
+            return false;
+        };
+        // Until the next change: the one after may take the response back.
+        let rows = (changed..run.end).take_while(|&row| !differs(changed, row)).count() - 1;
+        let places = (1..self.value.len() - rows).filter(|&row| self.free[row - 1] && self.free[row + rows]);
+        let after_change = places.filter(|&row| differs(row - 1, row + rows));
+        let mut moved: Vec<f64> =
+            after_change.map(|row| (self.value[row + rows] - self.value[row - 1]).abs()).collect();
+        moved.len() >= FEWEST_PLACES && median(&mut moved).is_some_and(|moved| moved > MOVES * self.typical)
+    }
 }
 
 /// Returns the ranges of rows that `continues` says to belong to the row before.
@@ -73,26 +212,24 @@ fn runs(rows: usize, continues: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     starts.iter().zip(ends).map(|(&start, end)| start..end).collect()
 }
 
-/// Returns the runs of readings under one voltage.
-fn runs_of_voltage(record: &Record, rows: &[(usize, f64, f64)]) -> Vec<Range<usize>> {
-    let voltage = |row: usize| record.rows[rows[row].0].voltage_v;
-    runs(rows.len(), |row| voltage(row) == voltage(row - 1))
-}
-
 /// Returns the least length of the runs of a stuck sensor, all others being far shorter and fewer than would make one by chance.
 fn shortest_stuck(runs: &[Range<usize>]) -> Option<usize> {
     let mut lengths: Vec<usize> = runs.iter().map(Range::len).collect();
     lengths.sort_unstable();
-    let rows: usize = lengths.iter().sum();
-    let is_gap = |at: &usize| {
-        let (shorter, length) = (&lengths[..*at], lengths[*at] as f64);
-        let repeats = (shorter.iter().map(|length| length - 1).sum::<usize>().max(1)) as f64 / rows as f64;
-        length >= SHORTEST_RUN.get()
-            && shorter.last().is_none_or(|longest| *longest as f64 <= OTHERS * length)
-            && repeats < LEAST_HELD.get()
-            && rows as f64 * repeats.powf(length - 1.0) < BY_CHANCE
-    };
-    (0..lengths.len()).find(is_gap).map(|at| lengths[at])
+    let rows = lengths.iter().sum::<usize>() as f64;
+    let (mut longest, mut repeats) = (0, 0);
+    for length in lengths {
+        let (part, run) = (repeats.max(1) as f64 / rows, length as f64);
+        if run >= SHORTEST_RUN.get()
+            && longest as f64 <= OTHERS * run
+            && part < LEAST_HELD.get()
+            && rows * part.powf(run - 1.0) < BY_CHANCE
+        {
+            return Some(length);
+        }
+        (longest, repeats) = (length, repeats + length - 1);
+    }
+    None
 }
 
 #[cfg(test)]
@@ -168,6 +305,40 @@ mod tests {
         assert_eq!(stuck.rows, rows_of(&runs));
     }
 
+    /// Steps of 12 rows that never let a lightly damped spring rest, and one long rest, read in steps of 0.5 V; with noise of the readings
+    /// and of the voltage that the file has, in V.
+    fn paused(noise_v: f64, noise_of_voltage_v: f64) -> Record {
+        let (mut at, mut speed, mut random) = (0.0, 0.0, 1u32);
+        let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
+            if row % 12 == 0 {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            }
+            let volts = if (900..1400).contains(&row) { 40.0 } else { f64::from(random >> 24) };
+            speed += 0.4 * (volts - at) - 0.25 * speed;
+            at += speed;
+            let measured = Some(((at + noise_v * noise) / 0.5).round() * 0.5);
+            let voltage_v = volts + noise_of_voltage_v * (noise * 1e3).sin();
+            Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured }
+        });
+        Record { name: String::new(), rows: rows.collect() }
+    }
+
+    /// One pulse that takes a fast spring beyond the sensor's bound, and no other reading near it.
+    fn pulse() -> Record {
+        let mut record = record(|_| 0.3);
+        for (row, of) in record.rows.iter_mut().enumerate().filter(|(row, _)| (700..760).contains(row)) {
+            (of.voltage_v, of.measured) = (900.0, Some(if row < 702 { 400.0 } else { 500.0 }));
+        }
+        record
+    }
+
+    #[test]
+    fn a_sensor_that_stops_before_the_end_was_stuck() {
+        for runs in [[[1700, 2000]], [[1400, 2000]]] {
+            assert_eq!(stuck_in(&held_in(noisy(), &runs, None)).unwrap().rows, rows_of(&runs));
+        }
+    }
+
     #[test]
     fn a_bound_a_grid_and_a_spring_at_rest_are_not_stuck() {
         let changed = |mut record: Record, by: &dyn Fn(f64) -> f64| {
@@ -193,6 +364,7 @@ mod tests {
                 records.push(changed(record(|state| 0.01 * scale * state), &|reading| (reading / step).round() * step));
             }
         }
+        records.extend([paused(0.0, 0.0), paused(0.02, 0.0), paused(0.02, 0.5), pulse()]);
         for (index, record) in records.iter().enumerate() {
             assert_eq!(held(record), None, "{index}");
         }

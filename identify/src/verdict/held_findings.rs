@@ -1,15 +1,27 @@
 //! The finding that readings were held, which the repeated numbers prove.
 
+use simulation::record::Record;
 use simulation::units::Units;
 
-use crate::answer::{Finding, Parameter, Report, Verdict};
+use crate::answer::{Finding, Parameter, Verdict};
 use crate::dimension::Dimension;
 use crate::record::held::{Held, Reason};
+use crate::record::input::Input;
+use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::probability::Z;
+use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::finding::explained;
 
-/// Adds the finding to a report, in the file's units, on the same record, without the held readings unless they are reports of changes.
-pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
+/// Adds the finding to the report of a diagnosis, in the file's units, of `record` without its held readings unless they are reports of
+/// changes.
+pub(crate) fn add_held(diagnosis: &mut Diagnosis, record: &Record, held: &Held, input: Input, units: &Units) {
+    let after = diagnosis.report.extended.quality.rmse;
+    let before = match held.reason {
+        // Beyond the last good reading there is no line to another one.
+        Reason::Stuck => root_mean_square(&diagnosis.errors_on(record, input)),
+        _ => after.hypot(held.error),
+    };
+    let report = &mut diagnosis.report;
     if held.reported_change().is_none() {
         report.rows += held.rows.len();
     }
@@ -59,12 +71,11 @@ pub(crate) fn add_held(report: &mut Report, held: &Held, units: &Units) {
     if report.findings.iter().any(|finding| finding.cause == cause) {
         return;
     }
-    let after = report.extended.quality.rmse;
     report.findings.push(Finding {
         cause,
         probability: 1.0,
         parameters: parameters.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
-        rmse_before: after.hypot(held.error),
+        rmse_before: before,
         rmse_after: after,
         evidence: format!("{percent:.0} % of the readings repeat the one before, to the last digit, and {why}"),
         proved: true,

@@ -66,7 +66,8 @@ thresholds! {
     COARSE = 2.0, "scales of the noise";
     /// Truncation instead of rounding is considered from this size of a step.
     LEAST_TRUNCATION = 0.5, "scales of the noise";
-    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held.
+    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held, and beside which no
+    /// longer run is that of a stuck sensor.
     LEAST_HELD = 0.15, "of the readings";
     /// Readings of which more return to the one before last are on a grid, and not held.
     MOST_RETURNS = 0.02, "of the new readings";
@@ -112,7 +113,7 @@ thresholds! {
     MOST_DAMPED = 0.5, "damping ratio", set by "cargo campaign out-of-model";
     /// Smallest part of the readings' sum of squares before a step of the gain, and after it: with less before, it is a gain error.
     LEAST_PART_OF_STEP = 0.1, "of the sum of squares";
-    /// Shortest run of shifted readings that is a reading offset.
+    /// Shortest run of shifted readings that is a reading offset, and of equal ones that is a stuck sensor.
     SHORTEST_RUN = 5.0, "rows";
     /// Price of the places of a run of shifted readings; neighbouring runs are nearly equivalent.
     PRICE_OF_RUN = 1.25, "nats for each unit of ln(rows)";
