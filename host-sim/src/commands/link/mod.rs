@@ -195,7 +195,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             if done.is_err() && arms {
                 // What this command has armed does not stay so without the stiffness that it was armed for.
                 // Without its host the MCU ramps down by itself.
-                // Without its host the MCU ramps down by itself.
                 let _ = session.client.leave();
             }
             session.show_and_keep(done?, keep)
