@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -557,8 +558,11 @@ public:
         beating_ = std::thread([this] { heartbeats(); });
     }
 
-    /// Disarms the microcontroller and closes the port; not one that another program commands by now.
+    /// Disarms the microcontroller and closes the port; not one that another program commands by now. Waits about a second for answers, a
+    /// shorter timeout if there is one.
     ~Link() {
+        // Also of a heartbeat that waits for its answer.
+        tries_ = std::min(tries_.load(), last_tries);
         {
             const std::lock_guard<std::mutex> guard(closing_lock_);
             closing_ = true;
@@ -706,11 +710,13 @@ private:
     };
     /// A request is repeated after this time.
     static constexpr std::chrono::milliseconds each{100};
+    /// Number of times that a request at the end is sent at most.
+    static constexpr int last_tries = 5;
     /// Requests after which a new session begins: a session has 65 536 numbers.
     static constexpr unsigned most_requests = 60'000;
 
     Port port_;
-    int tries_;
+    std::atomic<int> tries_;
     std::recursive_mutex mutex_;
     std::uint16_t sequence_ = 0;
     std::uint32_t session_ = 0;
@@ -832,7 +838,7 @@ private:
                 return std::move(answer->message);
             }
         }
-        throw Error(port_.name() + ": no answer to " + std::to_string(tries_) +
+        throw Error(port_.name() + ": no answer to " + std::to_string(tries_.load()) +
                     " requests; is the MCU running on this port?");
     }
 

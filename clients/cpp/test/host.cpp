@@ -1,5 +1,6 @@
 // The client and an MCU within this program, which does what no healthy board does.
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
@@ -28,7 +29,7 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 using vsj::Bytes;
 using vsj::wire::Writer;
 
-constexpr std::uint8_t hello = 0, ask_status = 1, disarm = 4, stream = 7, heard = 12;
+constexpr std::uint8_t hello = 0, ask_status = 1, disarm = 4, heartbeat = 6, stream = 7, heard = 12;
 
 Writer& sample(Writer& message, std::uint64_t tick) {
     message.number(tick);
@@ -52,6 +53,8 @@ public:
     std::array<std::atomic<unsigned>, 32> asked{};
     /// True if each request but a Hello is refused, as of another session.
     std::atomic<bool> is_of_another_session{false};
+    /// True if nothing is answered.
+    std::atomic<bool> is_mute{false};
 
     explicit Mcu(std::function<Bytes(const Bytes&)> before = {}) : before_(std::move(before)) {}
     ~Mcu() { thread_.join(); }
@@ -85,6 +88,7 @@ private:
     void answer(int file, const vsj::wire::Packet& request) {
         const std::uint8_t code = request.message[0];
         ++asked[code];
+        if (is_mute) return;
         if (code == hello) ++nonce_;
         Bytes reply{0, 0, 0};
         if (code == hello || code == ask_status) reply = status(60'000);
@@ -161,6 +165,21 @@ void output_of_another_program() {
     Mcu mcu;
     with_link(mcu, [&](vsj::Link&) { mcu.is_of_another_session = true; });
     expect(mcu.asked[disarm] == 0, "no disarm of another program's output");
+}
+
+/// The end waits for no answer as long as a call does, not even while a heartbeat waits for one.
+void end_while_nothing_is_answered() {
+    for (const bool is_heartbeat : {false, true}) {
+        std::chrono::steady_clock::time_point end;
+        Mcu mcu;
+        with_link(mcu, [&](vsj::Link&) {
+            mcu.is_mute = true;
+            while (is_heartbeat && mcu.asked[heartbeat] == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+            end = std::chrono::steady_clock::now();
+        });
+        expect(std::chrono::steady_clock::now() - end < std::chrono::seconds(5), "an end within seconds");
+        expect(mcu.asked[disarm] == 5, "a disarm that is repeated");
+    }
 }
 
 /// A session has 65 536 numbers; refusals as of another session use none.
@@ -246,6 +265,7 @@ int main() {
     flags_of_a_serial_device();
     samples_that_nobody_takes();
     output_of_another_program();
+    end_while_nothing_is_answered();
     numbers_that_run_out();
-    std::puts("dropped samples counted, another program's output left, a session renewed, a serial device set, every address tried");
+    std::puts("dropped samples counted, another program's output left, an end without answers, a session renewed, a serial device set, every address tried");
 }
