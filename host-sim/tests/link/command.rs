@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use link::isolation::Off;
@@ -16,7 +15,7 @@ use serialport::{SerialPort, TTYPort};
 use simulation::record::{MEASURED, Record};
 
 use crate::mcu::{Mcu, Setup};
-use crate::vsj::{bad, good, json, run, start, stdout, vsj};
+use crate::vsj::{bad, good, json, run, send, start, stdout, vsj};
 
 #[test]
 fn a_session_over_a_socket() {
@@ -311,7 +310,7 @@ fn a_recording_names_each_verdict_that_comes_with_the_telemetry() {
         wait_for(20);
         mcu.with(|shared| shared.isolation = IsolationReport { verdict: 0x302, size: 0.5, ..Default::default() });
         wait_for(60);
-        assert!(Command::new("kill").args(["-INT", &recording.id().to_string()]).status().unwrap().success());
+        send("-INT", &recording);
         let recording = recording.wait_with_output().unwrap();
         let summary: serde_json::Value = serde_json::from_str(&stdout(&recording)).unwrap();
         let verdicts: Vec<_> =
@@ -355,8 +354,7 @@ fn ctrl_c_ends_a_recording_with_its_summary() {
     while std::fs::read_to_string(&out).map_or(0, |text| text.lines().count()) < 20 {
         std::thread::sleep(Duration::from_millis(5));
     }
-    let interrupted = Command::new("kill").args(["-INT", &recording.id().to_string()]).status().unwrap();
-    assert!(interrupted.success());
+    send("-INT", &recording);
     let recording = recording.wait_with_output().unwrap();
     assert!(recording.status.success(), "{recording:?}");
     let summary: serde_json::Value = serde_json::from_str(&stdout(&recording)).unwrap();
@@ -379,7 +377,7 @@ fn a_signal_disables_the_output_although_no_answer_arrives() {
         while mute && mcu.with(|shared| shared.counters.repeated == before) {
             std::thread::sleep(Duration::from_millis(5));
         }
-        assert!(Command::new("kill").args([signal, &kept.id().to_string()]).status().unwrap().success());
+        send(signal, &kept);
         let kept = kept.wait_with_output().unwrap();
         let remarks = String::from_utf8(kept.stderr).unwrap();
         assert_eq!(kept.status.code(), Some(code), "{remarks}");
@@ -391,6 +389,49 @@ fn a_signal_disables_the_output_although_no_answer_arrives() {
         };
         assert!(remarks.contains(said), "{remarks}");
         mcu.with(|shared| shared.mute = false);
+    }
+}
+
+#[test]
+fn ctrl_c_while_the_mcu_is_armed_sends_no_target_and_disables_the_output() {
+    let mcu =
+        Mcu::on_socket(Setup { silence_ms: 60_000, mute_when: |it| it.state == State::Armed, ..Setup::default() });
+    for arguments in [&["arm"][..], &["set", "100", "--arm"], &["set", "100", "--arm", "--keep", "inf"]] {
+        mcu.with(|shared| (shared.changes.clear(), shared.ordered.clear()));
+        let arming = start(&mcu.port, &[arguments, &["--timeout", "120"]].concat());
+        mcu.wait_for(State::Armed);
+        send("-INT", &arming);
+        // Sooner than the request is given up.
+        std::thread::sleep(Duration::from_millis(50));
+        mcu.with(|shared| shared.mute = false);
+        let arming = arming.wait_with_output().unwrap();
+        let remarks = String::from_utf8(arming.stderr).unwrap();
+        assert_eq!(arming.status.code(), Some(130), "{arguments:?}: {remarks}");
+        assert!(remarks.contains("ended by a signal; the output is disabled"), "{arguments:?}: {remarks}");
+        let (state, ordered) = mcu.with(|shared| (shared.sample.state, shared.ordered.clone()));
+        assert_eq!(state, State::Disarmed, "{arguments:?}: {remarks}");
+        assert!(ordered.iter().all(|it| it.target.is_none() || it.arming.is_some()), "{arguments:?}: {ordered:?}");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_capture_without_its_rows_and_disables_the_output() {
+    let mcu = Mcu::on_socket(Setup { silence_ms: 60_000, ..Setup::default() });
+    let folder = tempfile::tempdir().unwrap();
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        good(&mcu.port, &["set", "100", "--arm"]);
+        let out = folder.path().join(format!("{code}.csv"));
+        let capturing = start(&mcu.port, &["capture", "--seconds", "2", "--out", out.to_str().unwrap()]);
+        // Created before the capture begins.
+        while !out.exists() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        send(signal, &capturing);
+        let capturing = capturing.wait_with_output().unwrap();
+        let (text, remarks) = (stdout(&capturing), String::from_utf8(capturing.stderr).unwrap());
+        assert_eq!(capturing.status.code(), Some(code), "{text}{remarks}");
+        assert!(text.contains(": 0 rows") && remarks.contains("the output is disabled"), "{text}{remarks}");
+        assert_eq!(mcu.with(|shared| shared.sample.state), State::Disarmed, "{text}{remarks}");
     }
 }
 

@@ -45,6 +45,8 @@ pub(crate) struct Setup {
     pub(crate) dac_bits: u32,
     /// True if the verdict of the isolation bank comes with the telemetry.
     pub(crate) says_verdict: bool,
+    /// Nothing that the MCU sends arrives any more, see [`Shared::mute`], as soon as this is true of a sample.
+    pub(crate) mute_when: fn(&Telemetry) -> bool,
 }
 
 impl Default for Setup {
@@ -58,6 +60,7 @@ impl Default for Setup {
             forgets: false,
             dac_bits: 12,
             says_verdict: true,
+            mute_when: |_| false,
         }
     }
 }
@@ -340,6 +343,7 @@ impl Chip {
         if shared.changes.last().is_none_or(|last| last.state != sample.state) {
             shared.changes.push(sample);
         }
+        shared.mute |= (self.setup.mute_when)(&sample) && !(self.setup.mute_when)(&self.view.sample);
         if heard {
             shared.heard = sample.tick;
         }

@@ -41,3 +41,7 @@ pub(crate) fn bad(code: i32, port: &str, arguments: &[&str]) -> String {
 pub(crate) fn start(port: &str, arguments: &[&str]) -> Child {
     vsj(port, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
+
+pub(crate) fn send(signal: &str, to: &Child) {
+    assert!(Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap().success());
+}

@@ -81,7 +81,8 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     disarmed?;
     let volts = volts_of(&amplifier, rate_hz, shown.as_ref()).with_context(|| name.clone())?;
     let mut all = Vec::new();
-    while (all.len() as u32) < captured {
+    // A signal does not wait for the rows either.
+    while (all.len() as u32) < captured && !stopped() {
         let first = all.len() as u32;
         let rows = session.client.rows(first).with_context(|| name.clone())?;
         if rows.is_empty() {
@@ -114,7 +115,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// Commands the schedule until all rows are captured. Returns their number, fewer after Ctrl-C, and a sample of the time with a
+/// Commands the schedule until all rows are captured. Returns their number, fewer after a signal, and a sample of the time with a
 /// voltage.
 fn follow(
     session: &mut Session,
@@ -126,7 +127,9 @@ fn follow(
     let start = Instant::now();
     let (mut asked, mut shown) = (start, None);
     loop {
-        drive.step(session)?;
+        if !stopped() {
+            drive.step(session)?;
+        }
         if start.elapsed() >= length || asked.elapsed() >= POLL || stopped() {
             asked = Instant::now();
             let state = session.client.capture_state().with_context(|| session.client.name().to_owned())?;

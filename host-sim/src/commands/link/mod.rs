@@ -8,14 +8,14 @@ pub(super) mod session;
 mod settings;
 mod watch;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use host_sim::link::{Client, Patience, Port, desired, fault as parse_fault};
 use host_sim::output::terminal::remark;
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
-use session::{Session, seconds};
+use session::{Session, seconds, stopped};
 
 /// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, adaptation, watch, record, capture, model, settings
 #[derive(Args, Debug)]
@@ -190,6 +190,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             let arms = set.arm && session.status.sample.state == link::State::Disarmed;
             if set.arm {
                 session.order(Request::Arm)?;
+                if stopped() {
+                    bail!("{}: no target is set", arguments.port);
+                }
             }
             let done = session.order(Request::Set(target));
             if done.is_err() && arms {
@@ -233,5 +236,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Command::Settings(arguments) => settings::run(&mut session, arguments, source.as_ref()),
     };
     let done = execute();
-    session.finish(done)
+    let ctrl_c_is_usual = keep.is_some() || matches!(arguments.command, Command::Watch(_) | Command::Record(_));
+    session.finish(done, ctrl_c_is_usual)
 }

@@ -35,11 +35,11 @@ impl Session {
         self.client.interrupt_when(stopped);
     }
 
-    /// Returns what was `done`, unless a signal has ended it: then disables the output and ends the program as the signal would. Ctrl-C
-    /// also ends commands that have no other end, which is no failure.
-    pub(super) fn finish(mut self, done: Result<()>) -> Result<()> {
+    /// Returns what was `done`, unless a signal has ended it: then disables the output and ends the program as the signal would. Where
+    /// Ctrl-C is the usual end, it is no failure.
+    pub(super) fn finish(mut self, done: Result<()>, ctrl_c_is_usual: bool) -> Result<()> {
         let signal = SIGNAL.load(Ordering::Relaxed);
-        if signal == 0 || signal == CTRL_C && done.is_ok() {
+        if signal == 0 || signal == CTRL_C && ctrl_c_is_usual && done.is_ok() {
             return done;
         }
         if let Err(error) = done {
