@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use link::isolation::Off;
-use link::{AdaptationReport, Frame, IsolationReport, Reply, State, Status};
+use link::{AdaptationReport, Command, Frame, IsolationReport, Reply, State, Status, Telemetry};
 use model::adaptation::{Parameters, Phase, Settings};
 use model::isolation::{Cause, Causes, Finding, Verdict};
 use model::{Plant, supervisor};
@@ -412,6 +412,20 @@ fn ctrl_c_while_the_mcu_is_armed_sends_no_target_and_disables_the_output() {
         assert_eq!(state, State::Disarmed, "{arguments:?}: {remarks}");
         assert!(ordered.iter().all(|it| it.target.is_none() || it.arming.is_some()), "{arguments:?}: {ordered:?}");
     }
+}
+
+#[test]
+fn a_signal_while_the_first_target_is_set_disables_the_output_once() {
+    let mute_when = |sample: &Telemetry| sample.target.to_f64() == 100.0;
+    let mcu = Mcu::on_socket(Setup { silence_ms: 60_000, mute_when, ..Setup::default() });
+    let arming = start(&mcu.port, &["set", "100", "--arm", "--timeout", "120"]);
+    mcu.wait_for_target(100.0);
+    send("-TERM", &arming);
+    let arming = arming.wait_with_output().unwrap();
+    let remarks = String::from_utf8(arming.stderr).unwrap();
+    assert_eq!((arming.status.code(), remarks.matches("not disarmed").count()), (Some(143), 1), "{remarks}");
+    let disarm = |command: &&Command| command.arming == Some(supervisor::Command::Disarm);
+    assert_eq!(mcu.with(|shared| shared.ordered.iter().filter(disarm).count()), 1, "{remarks}");
 }
 
 #[test]

@@ -195,7 +195,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
                 }
             }
             let done = session.order(Request::Set(target));
-            if done.is_err() && arms {
+            // After a signal the end of the session does it.
+            if done.is_err() && arms && !stopped() {
                 // What this command has armed does not stay so without the stiffness that it was armed for.
                 // Without its host the MCU ramps down by itself.
                 let _ = session.client.leave();
