@@ -296,6 +296,9 @@ def test_durations_are_in_s_whatever_the_name_says(sample):
     expected = vsj.identify((sample["time_s"], sample["voltage_v"], sample["stiffness"])).nominal.tau_s[0].value
     frame = pandas.DataFrame({"t_ms": pandas.to_timedelta(sample["time_s"], unit="s"), "u_V": sample["voltage_v"], "x_mm": sample["stiffness"]})
     assert vsj.identify(frame).nominal.tau_s[0].value == pytest.approx(expected, rel=1e-6)
+    frame["t_ms"] = frame["t_ms"].to_numpy().astype("m8[s]") + np.timedelta64(10**10, "s")
+    with pytest.raises(vsj.BadInput, match="a duration of more than 292 years"):
+        vsj.identify(frame)
 
 
 def test_what_a_mask_hides_is_no_reading(sample):

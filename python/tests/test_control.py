@@ -4,7 +4,8 @@ import copy
 import pickle
 import threading
 import time
-from datetime import timedelta, timezone
+from datetime import datetime, timedelta, timezone
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas
@@ -137,6 +138,16 @@ def test_times_of_a_simulation_may_be_stamps_and_durations():
     in_zones = [naive[0].replace(tzinfo=timezone(timedelta(hours=1))), *(it.replace(tzinfo=timezone.utc) - timedelta(hours=1) for it in naive[1:])]
     for times in (naive, in_zones, [pandas.Timestamp(it) for it in naive], [it - naive[0] for it in naive]):
         np.testing.assert_array_equal(vsj.simulate("paper", times, [0.0, 300.0, 300.0]), expected)
+    expected = vsj.simulate("paper", [0.0, 1.0, 2.5], [200.0, 300.0, 300.0])
+    # The clock goes forward at 2 o'clock.
+    berlin = ZoneInfo("Europe/Berlin")
+    in_spring = [datetime(2026, 3, 29, *clock, tzinfo=berlin) for clock in ((1, 59, 59), (3, 0, 0), (3, 0, 1, 500_000))]
+    # From the longest that is a number of ns on.
+    late = [timedelta(seconds=9_223_372_036 + seconds) for seconds in (0, 1, 2.5)]
+    for times in (in_spring, [pandas.Timestamp(it) for it in in_spring], late):
+        np.testing.assert_array_equal(vsj.simulate("paper", times, [200.0, 300.0, 300.0]), expected)
+    with pytest.raises(vsj.BadInput, match="^time: .*; expected numbers$"):
+        vsj.simulate("paper", [timedelta.min, timedelta.max], [0.0, 300.0])
     with pytest.raises(vsj.BadInput, match="^time: .*; expected time stamps, all with a zone or all without$"):
         vsj.simulate("paper", [naive[0], in_zones[1]], [0.0, 300.0])
 

@@ -2,7 +2,7 @@
 
 import warnings
 from dataclasses import asdict, dataclass
-from datetime import datetime
+from datetime import datetime, timezone
 from enum import IntFlag
 from typing import List, Mapping, Optional, Tuple
 
@@ -276,10 +276,17 @@ def _seconds(time):
     array = _array(time, "time")
     if array.size and (array.dtype.kind == "M" or isinstance(array.flat[0], datetime)):
         try:
+            if array.dtype.kind == "O":
+                array = np.frompyfunc(_in_utc, 1, 1)(array)
             array = unmasked(array - array.flat[:1])
         except TypeError as error:
             raise _vsj.BadInput(f"time: {error}; expected time stamps, all with a zone or all without") from None
     return vector(array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array, "time")
+
+
+def _in_utc(stamp):
+    """The stamp in UTC if it has a zone: Python's difference of two in one zone is that of its clock, which summer time sets."""
+    return stamp.astimezone(timezone.utc) if getattr(stamp, "tzinfo", None) else stamp
 
 
 def warn_of(left_out):

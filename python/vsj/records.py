@@ -12,6 +12,10 @@ CONTRACT = ("time_s", "voltage_v", "stiffness")
 """Names of the columns of an array without names."""
 _READ_BY = {".parquet": "the frame of pandas.read_parquet", ".mcap": "the command vsj, which reads MCAP"}
 """What takes the place of a path that is not that of a CSV file."""
+_MOST_DAYS = 2**63 // 86_400_000_000
+"""Days that fit in NumPy's time in µs."""
+_LONGEST_S = 2**63 / 1e9
+"""Seconds that fit in NumPy's time in ns."""
 
 
 class RecordWarning(UserWarning):
@@ -126,13 +130,18 @@ def unmasked(values):
     if not np.ma.is_masked(values):
         array = np.asarray(values)
         # Python's own durations; its time stamps may have zones, which NumPy has not.
-        has_durations = array.dtype.kind == "O" and array.size and all(isinstance(it, timedelta) for it in array.flat)
-        return array.astype("m8[ns]") if has_durations else array
+        has_durations = array.dtype.kind == "O" and array.size and all(map(_is_duration, array.flat))
+        return array.astype("m8[us]") if has_durations else array
     kind = values.dtype.kind
     if kind in "Mm":
         return values.filled(np.array("NaT", values.dtype))
     # Whole numbers may have more digits than a double.
     return values.astype(np.float64).filled(np.nan) if kind in "bf" else values.astype(object).filled(None)
+
+
+def _is_duration(cell):
+    # NumPy's time in µs, as Python's is, ends at 292 000 years, silently.
+    return isinstance(cell, timedelta) and abs(cell.days) < _MOST_DAYS
 
 
 def _cells(array):
@@ -143,6 +152,8 @@ def _cells(array):
     if kind == "M":
         return np.datetime_as_string(array, unit="ns").tolist()
     if kind == "m":
+        if (np.abs(array / np.timedelta64(1, "s")) > _LONGEST_S).any():
+            raise bad_input("column: a duration of more than 292 years; expected durations that are whole numbers of ns")
         return array.astype("m8[ns]")
     # Times in ns since 1970 have more digits than a double.
     if kind in "iu" and array.size and max(abs(int(array.min())), abs(int(array.max()))) > 2**53:
