@@ -43,7 +43,7 @@ pub struct Client {
     port: Port,
     patience: Patience,
     /// True if the program is to end.
-    interrupted: fn() -> bool,
+    interrupted: Box<dyn Fn() -> bool + Send>,
     receiver: Receiver,
     sequence: Sequence,
     session: Nonce,
@@ -101,7 +101,7 @@ impl Client {
         let mut client = Self {
             port,
             patience,
-            interrupted: || false,
+            interrupted: Box::new(|| false),
             receiver,
             sequence,
             session,
@@ -160,8 +160,8 @@ impl Client {
 
     /// Makes requests that are not answered within 0.3 s fail with [`Failure::Interrupted`] as soon as `asked` is true. It is called while
     /// a request waits, in the thread of its caller.
-    pub fn interrupt_when(&mut self, asked: fn() -> bool) {
-        self.interrupted = asked;
+    pub fn interrupt_when(&mut self, asked: impl Fn() -> bool + Send + 'static) {
+        self.interrupted = Box::new(asked);
     }
 
     /// Disables the output before the connection ends, without waiting long for an answer; not that of an MCU which another program
@@ -170,7 +170,7 @@ impl Client {
     /// # Errors
     /// [`Failure`] if the MCU has not confirmed it; without its host it ramps down by itself.
     pub fn leave(&mut self) -> Result<(), Failure> {
-        (self.patience, self.interrupted) = (Patience::of(LEAVING), || false);
+        (self.patience, self.interrupted) = (Patience::of(LEAVING), Box::new(|| false));
         match self.exchange(Request::Heartbeat) {
             Err(failure @ Failure::Refused(Reason::OtherSession | Reason::HelloFirst)) => Err(failure),
             _ => self.exchange(Request::Disarm).map(drop),

@@ -2,12 +2,12 @@
 
 use std::cell::RefCell;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Reason, Request, Status};
@@ -110,11 +110,19 @@ impl Connection {
     }
 }
 
+/// Who needs the connection while a heartbeat waits for its answer.
+#[derive(Default)]
+struct Needs {
+    closing: AtomicBool,
+    /// Number of calls that wait for the connection.
+    waiting: AtomicU32,
+}
+
 /// An open port.
 #[pyclass(frozen, module = "vsj._vsj")]
 pub(crate) struct Port {
     connection: Arc<Mutex<Option<Connection>>>,
-    closing: Arc<AtomicBool>,
+    needs: Arc<Needs>,
     beating: Mutex<Option<JoinHandle<Option<Failure>>>>,
 }
 
@@ -137,10 +145,15 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Sends heartbeats until the port is closed, then disables the output; a lost connection is reported by the next call. Returns why the
 /// output may still be enabled: of an MCU that has restarted it is not, and that of another program is not touched.
-fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) -> Option<Failure> {
-    while !closing.load(Ordering::Relaxed) {
+fn beat(connection: &Mutex<Option<Connection>>, needs: &Arc<Needs>) -> Option<Failure> {
+    while !needs.closing.load(Ordering::Relaxed) {
         let mut pause = TURN;
         if let Some(connection) = lock(connection).as_mut() {
+            let asked = needs.clone();
+            // A call that waits for a heartbeat's answer could not be ended by a signal.
+            connection.client.interrupt_when(move || {
+                asked.closing.load(Ordering::Relaxed) || asked.waiting.load(Ordering::Relaxed) > 0
+            });
             let _ = connection.beat();
             pause = pause.min(connection.heartbeat / 4);
         }
@@ -153,15 +166,13 @@ fn beat(connection: &Mutex<Option<Connection>>, closing: &AtomicBool) -> Option<
 impl Port {
     /// Does `work` with the connection, without the interpreter's lock. A signal ends the wait for an answer with its exception.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Connection) -> Result<T> + Send) -> PyResult<T> {
-        let done = py.detach(|| match lock(&self.connection).as_mut() {
-            Some(connection) => {
-                connection.client.interrupt_when(interrupted);
-                let done = work(connection);
-                // The thread of the heartbeats never waits for the interpreter.
-                connection.client.interrupt_when(|| false);
-                done
-            }
-            None => Err(anyhow::anyhow!("the link is closed")),
+        let done = py.detach(|| {
+            self.needs.waiting.fetch_add(1, Ordering::Relaxed);
+            let mut connection = lock(&self.connection);
+            self.needs.waiting.fetch_sub(1, Ordering::Relaxed);
+            let Some(connection) = connection.as_mut() else { bail!("the link is closed") };
+            connection.client.interrupt_when(interrupted);
+            work(connection)
         });
         SIGNAL.take().map_or_else(|| done.map_err(link_exception), Err)
     }
@@ -181,10 +192,10 @@ impl Port {
             Ok(Connection { client, heartbeat: heartbeat(&status), status, heard: Instant::now() })
         };
         let connection = Arc::new(Mutex::new(Some(py.detach(open).map_err(link_exception)?)));
-        let closing = Arc::new(AtomicBool::new(false));
-        let (shared, until) = (connection.clone(), closing.clone());
-        let beating = thread::spawn(move || beat(&shared, &until));
-        Ok(Self { connection, closing, beating: Mutex::new(Some(beating)) })
+        let needs = Arc::<Needs>::default();
+        let (shared, asked) = (connection.clone(), needs.clone());
+        let beating = thread::spawn(move || beat(&shared, &asked));
+        Ok(Self { connection, needs, beating: Mutex::new(Some(beating)) })
     }
 
     fn status(&self, py: Python<'_>) -> PyResult<String> {
@@ -274,7 +285,7 @@ impl Port {
     /// Disables the output, ends the heartbeats and closes the port. Returns what is to be said if the MCU has not confirmed it.
     fn close(&self, py: Python<'_>) -> Option<String> {
         py.detach(|| {
-            self.closing.store(true, Ordering::Relaxed);
+            self.needs.closing.store(true, Ordering::Relaxed);
             let beating = lock(&self.beating).take()?;
             beating.thread().unpark();
             let failure = beating.join().unwrap_or_default();
@@ -286,7 +297,7 @@ impl Port {
 
 impl Drop for Port {
     fn drop(&mut self) {
-        self.closing.store(true, Ordering::Relaxed);
+        self.needs.closing.store(true, Ordering::Relaxed);
         // The thread never waits for the interpreter.
         if let Some(beating) = lock(&self.beating).take() {
             beating.thread().unpark();

@@ -132,6 +132,28 @@ def test_ctrl_c_ends_a_call_that_waits_for_an_answer_and_the_output_is_disabled(
     assert mcu.asked[ARM] < 100 and mcu.ended()[DISARM] > 0
 
 
+def test_ctrl_c_ends_a_call_also_while_a_heartbeat_waits_for_its_answer(mcu):
+    mcu.silence = number(1000)
+    link = vsj.Link(mcu.port, timeout=25)
+    mcu.answers = lambda code: False
+    mcu.wait_for(HEARTBEAT, 1)
+    begin = time.monotonic()
+    with pytest.warns(RuntimeWarning, match="not disarmed: no answer to 5 requests"), pytest.raises(KeyboardInterrupt):
+        with link:
+            threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+            link.arm()
+    assert time.monotonic() - begin < 10
+    assert mcu.ended()[DISARM] == 5
+
+
+def test_closing_a_link_warns_of_an_output_that_may_be_enabled(mcu):
+    link = vsj.Link(mcu.port, timeout=25)
+    mcu.answers = lambda code: False
+    with pytest.warns(RuntimeWarning, match="not disarmed: no answer to 5 requests"):
+        link.close()
+    mcu.ended()
+
+
 def test_a_fault_is_reported_once_and_the_mcu_hears_of_its_receipt(mcu):
     with vsj.Link(mcu.port, timeout=25) as link:
         mcu.ahead[ARM] = 2 * frame(bytes(2), bytes([5, 1, 7, 4, 0b1000, 0]))

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import time
+import warnings
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple, Union
 
@@ -134,13 +135,17 @@ class Link:
     def __enter__(self) -> "Link":
         return self
 
-    def __exit__(self, *_: Any) -> None:
-        if not_disarmed := self._port.close():
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        if kind is not None:
+            # Another exception would take the place of the one that ends the block.
+            self.close()
+        elif not_disarmed := self._port.close():
             raise _vsj.LinkError(not_disarmed)
 
     def close(self) -> None:
-        """Disable the output, end the heartbeats and close the port."""
-        self._port.close()
+        """Disable the output, end the heartbeats and close the port. A ``RuntimeWarning`` says if the MCU has not confirmed it."""
+        if not_disarmed := self._port.close():
+            warnings.warn(not_disarmed, RuntimeWarning, stacklevel=2)
 
     def status(self) -> Dict[str, Any]:
         """The status of the MCU, with the fields of ``vsj link PORT status --json``."""
