@@ -75,8 +75,10 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let begun = session.client.capture(rows).with_context(|| name.clone());
     let followed = begun.and_then(|_| follow(session, schedule.as_ref(), Duration::from_secs_f64(length_s), rows));
     // Sending the rows takes longer than the capture, and must not hold a voltage meanwhile.
-    let ends = arguments.arm || schedule.is_some();
-    let disarmed = if ends { session.order(Request::Disarm).map(drop) } else { Ok(()) };
+    let ends = arguments.arm || schedule.is_some() || stopped();
+    // A failure after a signal ends the session at once, which disables the output.
+    let disarmed =
+        if ends && !(followed.is_err() && stopped()) { session.order(Request::Disarm).map(drop) } else { Ok(()) };
     let (captured, shown) = followed?;
     disarmed?;
     let volts = volts_of(&amplifier, rate_hz, shown.as_ref()).with_context(|| name.clone())?;
