@@ -1,10 +1,11 @@
 //! The list of all effects, in the order of the signal chain.
 
 use crate::effects::effect::Effect;
+use crate::effects::of_the_readings::{OUTLIERS, QUANTISATION, STUCK_SENSOR};
 use crate::effects::{
     amplifier_limit, amplifier_slew, charge_leakage, delay, drift, gain_error, hum, hysteresis, instantaneous_share,
-    outliers, quantisation, reading_offset, resonance, second_relaxation, sensor_saturation, series_lag,
-    static_nonlinearity, stuck_sensor, time_constant, voltage_dependent_time_constant,
+    reading_offset, resonance, second_relaxation, sensor_saturation, series_lag, static_nonlinearity, time_constant,
+    voltage_dependent_time_constant,
 };
 
 /// Every effect, in the order of the chain: each acts on the result of those before it.
@@ -26,9 +27,9 @@ pub static EFFECTS: &[&dyn Effect] = &[
     &hum::Hum,
     &reading_offset::ReadingOffset,
     &sensor_saturation::SensorSaturation,
-    &quantisation::Quantisation,
-    &stuck_sensor::StuckSensor,
-    &outliers::Outliers,
+    &QUANTISATION,
+    &STUCK_SENSOR,
+    &OUTLIERS,
 ];
 
 /// Returns the index of a cause in [`EFFECTS`]; `None` for an unknown name.

@@ -1,4 +1,4 @@
-//! The effects that may explain a difference between simulation and readings, one file each: bounds and initial points
+//! The effects that may explain a difference between simulation and readings, one file each but for those of the readings alone: bounds and initial points
 //! go out, and each effect modifies the chain, the stiffness or the readings.
 //!
 //! - *Cause*: the name of an effect in reports, e.g. `gain-error`.
@@ -22,17 +22,15 @@ mod hysteresis;
 pub mod identified;
 mod instantaneous_share;
 pub mod model;
+mod of_the_readings;
 mod offset_levels;
-mod outliers;
 mod passing_shift;
-mod quantisation;
 mod reading_offset;
 mod resonance;
 mod second_relaxation;
 mod sensor_saturation;
 mod series_lag;
 mod static_nonlinearity;
-mod stuck_sensor;
 mod time_constant;
 mod voltage_dependent_time_constant;
 

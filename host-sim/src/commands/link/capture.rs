@@ -76,7 +76,7 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let followed = begun.and_then(|_| follow(session, schedule.as_ref(), Duration::from_secs_f64(length_s), rows));
     // Sending the rows takes longer than the capture, and must not hold a voltage meanwhile.
     let ends = arguments.arm || schedule.is_some() || stopped();
-    // A failure after a signal ends the session at once, which disables the output.
+    // After a signal and a failure the end of the session disables the output.
     let disarmed =
         if ends && !(followed.is_err() && stopped()) { session.order(Request::Disarm).map(drop) } else { Ok(()) };
     let (captured, shown) = followed?;
