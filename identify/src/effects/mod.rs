@@ -1,5 +1,5 @@
-//! The effects that may explain a difference between simulation and readings, one file each but for those of the readings alone: bounds and initial points
-//! go out, and each effect modifies the chain, the stiffness or the readings.
+//! The effects that may explain a difference between simulation and readings, one file each, but one for those that are found in the
+//! readings themselves: bounds and initial points go out, and each effect modifies the chain, the stiffness or the readings.
 //!
 //! - *Cause*: the name of an effect in reports, e.g. `gain-error`.
 //! - *Form*: one of several laws of the same cause.
