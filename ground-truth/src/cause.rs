@@ -1,4 +1,5 @@
-//! 19 of the 20 causes that `vsj diagnose` distinguishes, all but `stuck-sensor`: name, block, parameters, forms and how their size is measured.
+//! 19 of the 20 causes that `vsj diagnose` distinguishes, all but `stuck-sensor`: name, block, parameters, forms and how their size is
+//! measured.
 
 use std::fmt::{self, Display};
 
