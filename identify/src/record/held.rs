@@ -15,7 +15,7 @@ use std::ops::Range;
 use simulation::record::Record;
 
 use crate::record::quantisation_grid::QuantisationGrid;
-use crate::record::stuck::stuck;
+use crate::record::stuck::{FEWEST_NEW, ROUNDING, TURNING, range, stuck};
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::thresholds::empirical::{COARSEST_GRID_OF_HELD, FEWEST_TIES, LEAST_HELD, MOST_RETURNS};
 use crate::stats::thresholds::probability::Z_RARE;
@@ -24,8 +24,6 @@ use crate::stats::thresholds::probability::Z_RARE;
 const SMALLEST: f64 = 0.05;
 /// Smallest change, relative to the median change, that shows a threshold.
 const THRESHOLD: f64 = 0.3;
-/// Part of the changes that turn back, from which readings are noise and not a smooth curve; of white noise two thirds do.
-pub(super) const TURNING: f64 = 0.2;
 /// Size of the changes after held readings, relative to that of the others, from which they catch up.
 const CATCHING_UP: f64 = 0.8;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
@@ -34,10 +32,6 @@ const CLOCK: f64 = 0.3;
 const SAME_SIZE: f64 = 0.5;
 /// Largest part of the held readings in one run: beyond, the sensor was stuck for a while.
 const LARGEST_RUN: f64 = 0.25;
-/// Fewest new readings.
-pub(super) const FEWEST_NEW: usize = 30;
-/// Largest difference of equal readings, relative to the range of all: what converting between units leaves.
-pub(super) const ROUNDING: f64 = 1e-12;
 
 /// Why readings were held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,11 +150,6 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
         return None;
     }
     Some((reason(rows, &new, &changes(&values)), new))
-}
-
-/// Returns the smallest and the largest of some values.
-pub(super) fn range(values: &[f64]) -> [f64; 2] {
-    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
 /// Returns the sizes of the changes between new readings under a voltage that rests, those after held readings or those without any.

@@ -15,10 +15,15 @@ use std::ops::Range;
 
 use simulation::record::Record;
 
-use crate::record::held::{FEWEST_NEW, ROUNDING, TURNING, range};
 use crate::stats::median::median;
 use crate::stats::thresholds::empirical::{FEWEST_TIES, LEAST_HELD, SHORTEST_RUN};
 
+/// Largest difference of equal readings, relative to the range of all: what converting between units leaves.
+pub(super) const ROUNDING: f64 = 1e-12;
+/// Part of the changes that turn back, from which readings are noise and not a smooth curve; of white noise two thirds do.
+pub(super) const TURNING: f64 = 0.2;
+/// Fewest new readings.
+pub(super) const FEWEST_NEW: usize = 30;
 /// Largest length of the other runs, relative to the shortest one of a stuck sensor.
 const OTHERS: f64 = 1.0 / 3.0;
 /// Expected number of runs by chance, below which there are none.
@@ -39,8 +44,9 @@ const LEAST_RANGE: f64 = 3.0;
 /// Shortest rest of the voltage in which a spring without noise may come to rest, in rows, and fewest rests that show that it does not.
 const REST: usize = 10;
 const FEWEST_RESTS: usize = 2;
-/// Fewest places elsewhere that show how the readings move.
+/// Fewest places elsewhere that show how the readings move, and most that are looked at.
 const FEWEST_PLACES: usize = 5;
+const MOST_PLACES: usize = 10_000;
 
 /// Readings of a record with what is typical of those that are not equal to their neighbours.
 struct Readings {
@@ -197,12 +203,18 @@ impl Readings {
         };
         // Until the next change: the one after may take the response back.
         let rows = (changed..run.end).take_while(|&row| !differs(changed, row)).count() - 1;
-        let places = (1..self.value.len() - rows).filter(|&row| self.free[row - 1] && self.free[row + rows]);
+        let places = (1..self.value.len() - rows).step_by(self.value.len().div_ceil(MOST_PLACES));
+        let places = places.filter(|&row| self.free[row - 1] && self.free[row + rows]);
         let after_change = places.filter(|&row| differs(row - 1, row + rows));
         let mut moved: Vec<f64> =
             after_change.map(|row| (self.value[row + rows] - self.value[row - 1]).abs()).collect();
         moved.len() >= FEWEST_PLACES && median(&mut moved).is_some_and(|moved| moved > MOVES * self.typical)
     }
+}
+
+/// Returns the smallest and the largest of some values.
+pub(super) fn range(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
 /// Returns the ranges of rows that `continues` says to belong to the row before.
