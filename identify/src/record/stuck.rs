@@ -7,9 +7,9 @@
 //! - ends with a jump although the voltage has rested, as the reading catches up with the response, or
 //! - began before a change of the voltage after which the readings move elsewhere;
 //!
-//! or if the readings jump to one value and back from it by more than they ever change, while the voltage rests: a loose contact. With
-//! noise a bound of the sensor is reached again and again, and left as the response changes: at an end of the range, or at 0, a run that
-//! is the only one there and ends while the voltage rests proves a fault, or one of a sensor that sticks elsewhere.
+//! or if the readings jump to one value and back from it by more than they ever change, while the voltage rests: a loose contact. At an
+//! end of the range, or at 0, only such jumps prove a fault, or a sensor that sticks elsewhere: a bound is kept as long as the response is
+//! beyond it, and an outlier or a shift may end that.
 
 use std::ops::Range;
 
@@ -86,10 +86,7 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let is_special = |run: &Range<usize>| [low, high, 0.0].iter().any(|special| readings.equal(run.start, *special));
     let sticks = !long.iter().all(is_special);
     // With noise, a bound is reached again and again.
-    let is_stuck = |run: &Range<usize>| {
-        let is_left_at_rest = readings.is_among_noise(run) || readings.catches_up(run);
-        !is_special(run) || (sticks || is_left_at_rest) && readings.begins(run) < FEWEST_TIES.count()
-    };
+    let is_stuck = |run: &Range<usize>| !is_special(run) || sticks && readings.begins(run) < FEWEST_TIES.count();
     let repeated = long.into_iter().filter(is_stuck).map(|run| run.start + 1..run.end);
     let faulty: Vec<Range<usize>> = jumped.into_iter().chain(repeated).collect();
     let mut is_faulty = vec![false; rows.len()];
@@ -159,12 +156,17 @@ impl Readings {
         turns as f64 > least * rows.len() as f64
     }
 
-    /// True if the readings jump to the run and back from it, by more than they change elsewhere, while the voltage rests.
+    /// True if the readings jump to the run and back from it, by more than they change elsewhere, while the voltage rests, and not from or
+    /// to a single one, which is an outlier in a longer run.
     fn jump(&self, run: &Range<usize>) -> bool {
         let jumps = |row: usize| {
             self.change(row).abs() > self.largest && self.rests(row.saturating_sub(MARGIN)..row + MARGIN + 1)
         };
-        jumps(run.start) && (run.end == self.value.len() || jumps(run.end))
+        let are_free =
+            |rows: Range<usize>| self.free[rows.start..rows.end.min(self.free.len())].iter().all(|free| *free);
+        jumps(run.start)
+            && are_free(run.start.saturating_sub(2)..run.start)
+            && (run.end == self.value.len() || jumps(run.end) && are_free(run.end..run.end + 2))
     }
 
     /// True if there is noise before the run and after it, under the same voltage; if this changes with the end of the run, noise in other
@@ -344,6 +346,15 @@ mod tests {
         record
     }
 
+    /// The plateau of a bound that is reached once, with outliers in it.
+    fn plateau_with_outliers() -> Record {
+        let mut record = record(|_| 0.3);
+        record.rows.truncate(1000);
+        record.rows.iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading.min(150.0)));
+        [450, 470, 540, 599].into_iter().for_each(|row: usize| record.rows[row].measured = Some(-60.0));
+        record
+    }
+
     #[test]
     fn a_sensor_that_stops_before_the_end_was_stuck() {
         for runs in [[[1700, 2000]], [[1400, 2000]]] {
@@ -376,7 +387,7 @@ mod tests {
                 records.push(changed(record(|state| 0.01 * scale * state), &|reading| (reading / step).round() * step));
             }
         }
-        records.extend([paused(0.0, 0.0), paused(0.02, 0.0), paused(0.02, 0.5), pulse()]);
+        records.extend([paused(0.0, 0.0), paused(0.02, 0.0), paused(0.02, 0.5), pulse(), plateau_with_outliers()]);
         for (index, record) in records.iter().enumerate() {
             assert_eq!(held(record), None, "{index}");
         }
