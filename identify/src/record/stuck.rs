@@ -5,11 +5,11 @@
 //!
 //! - is preceded and followed by noise while the voltage rests, or
 //! - ends with a jump although the voltage has rested, as the reading catches up with the response, or
-//! - began before a change of the voltage after which the readings move elsewhere;
+//! - began before a change of the voltage after which the readings move elsewhere.
 //!
-//! or if the readings jump to one value and back from it by more than they ever change, while the voltage rests: a loose contact. At an
-//! end of the range, or at 0, only such jumps prove a fault, or a sensor that sticks elsewhere: a bound is kept as long as the response is
-//! beyond it, and an outlier or a shift may end that.
+//! Of a sensor that sticks once, the other long runs are faults as well. So is one if the readings jump to one value and back from it by
+//! more than they ever change, while the voltage rests: a loose contact. At an end of the range, or at 0, only such jumps prove a fault,
+//! or a sensor that sticks elsewhere: a bound is kept as long as the response is beyond it, and an outlier or a shift may end that.
 
 use std::ops::Range;
 
@@ -79,15 +79,18 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let (jumped, others): (Vec<_>, Vec<_>) =
         runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
     let shortest = shortest_stuck(&others);
-    let stays =
+    let is_long = |run: &Range<usize>| shortest.is_some_and(|shortest| run.len() >= shortest);
+    let long: Vec<Range<usize>> = others.into_iter().filter(is_long).collect();
+    let special = [low, high, 0.0].map(|value| (value, readings.begins(value)));
+    let is_special = |run: &Range<usize>| special.iter().any(|(value, _)| readings.equal(run.start, *value));
+    let is_proved =
         |run: &Range<usize>| readings.is_among_noise(run) || readings.catches_up(run) || readings.stays_behind(run);
-    let long = others.into_iter().filter(|run| shortest.is_some_and(|shortest| run.len() >= shortest));
-    let long: Vec<Range<usize>> = if readings.have_noise() { long.filter(stays).collect() } else { Vec::new() };
-    let is_special = |run: &Range<usize>| [low, high, 0.0].iter().any(|special| readings.equal(run.start, *special));
-    let sticks = !long.iter().all(is_special);
+    let sticks = readings.have_noise() && long.iter().any(|run| !is_special(run) && is_proved(run));
     // With noise, a bound is reached again and again.
-    let is_stuck = |run: &Range<usize>| !is_special(run) || sticks && readings.begins(run) < FEWEST_TIES.count();
-    let repeated = long.into_iter().filter(is_stuck).map(|run| run.start + 1..run.end);
+    let is_bound = |run: &Range<usize>| {
+        special.iter().any(|(value, begins)| *begins >= FEWEST_TIES.count() && readings.equal(run.start, *value))
+    };
+    let repeated = long.into_iter().filter(|run| sticks && !is_bound(run)).map(|run| run.start + 1..run.end);
     let faulty: Vec<Range<usize>> = jumped.into_iter().chain(repeated).collect();
     let mut is_faulty = vec![false; rows.len()];
     faulty.iter().for_each(|run| is_faulty[run.clone()].fill(true));
@@ -133,9 +136,8 @@ impl Readings {
         self.value[row] - self.value[row - 1]
     }
 
-    /// Number of runs with the value of this one.
-    fn begins(&self, run: &Range<usize>) -> usize {
-        let value = self.value[run.start];
+    /// Number of runs with a value.
+    fn begins(&self, value: f64) -> usize {
         (1..self.value.len()).filter(|&row| self.equal(row, value) && !self.equal(row - 1, value)).count()
     }
 
