@@ -34,18 +34,29 @@ fn truncation_is_quantisation_and_not_an_offset() {
     assert!(offset(&report).is_some_and(|found| (found - 20.0).abs() < 1.0), "{report}");
 }
 
+/// The rows from 110 to 160 s, over two steps of the stair, with readings of `wrong`, which gets the reading of 110 s and the right one.
+fn wrong_for_a_while(wrong: impl Fn(f64, f64) -> f64) -> Vec<(f64, f64)> {
+    let fresh = read(8, |_, y, noise| y + noise);
+    let (stretch, mut rows) = (1100..1600, fresh.clone());
+    rows[stretch.clone()].iter_mut().for_each(|row| row.1 = wrong(fresh[stretch.start].1, row.1));
+    rows
+}
+
 /// An error that no cause explains is located in time.
 #[test]
-fn a_sensor_that_sticks_for_a_while_is_reported_with_its_time() {
-    let fresh = read(8, |_, y, noise| y + noise);
-    // Over two steps of the stair.
-    let stuck = 1100..1600;
-    let rows: Vec<_> = (0..fresh.len())
-        .map(|row| (fresh[row].0, if stuck.contains(&row) { fresh[stuck.start].1 } else { fresh[row].1 }))
-        .collect();
-    let report = diagnosed(&rows);
+fn an_error_of_a_stretch_of_readings_is_reported_with_its_time() {
+    let report = diagnosed(&wrong_for_a_while(|first, y| 2.0 * first - y));
     assert_eq!(report["verdict"], "unexplained", "{report}");
     let leftover = report["leftover"].as_str().unwrap();
     let times: Vec<f64> = leftover.split(" s").filter_map(|part| part.rsplit(' ').next()?.parse().ok()).collect();
     assert!(times.iter().any(|time| (110.0..160.0).contains(time)), "{leftover}");
+}
+
+#[test]
+fn a_sensor_that_sticks_for_a_while_is_named_with_its_time() {
+    let report = diagnosed(&wrong_for_a_while(|first, _| first));
+    assert_eq!((&report["verdict"], causes(&report)), (&"explained".into(), vec!["stuck-sensor"]), "{report}");
+    let parameters = &report["findings"][0]["parameters"];
+    let time = |name: &str| parameters[name]["value"].as_f64().unwrap();
+    assert!((time("from_s") - 110.0).abs() < 0.15 && (time("to_s") - 159.9).abs() < 0.15, "{parameters}");
 }
