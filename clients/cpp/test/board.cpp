@@ -1,32 +1,11 @@
 // The client and a running board, whose port is the argument.
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <iostream>
 
 #include <vsj_link.hpp>
 
-namespace {
-
-void expect(bool is_so, const std::string& what) {
-    if (is_so) return;
-    std::cerr << "expected: " << what << '\n';
-    std::exit(1);
-}
-
-template <typename Work>
-std::string error_of(Work work) {
-    try {
-        work();
-    } catch (const vsj::Error& error) {
-        return error.what();
-    }
-    return "";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-}  // namespace
+#include "expect.hpp"
 
 int main(int argc, char** argv) {
     if (argc != 3) return 2;

@@ -1,30 +1,14 @@
 // The client and an MCU within this program, which does what no healthy board does.
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
 #include <functional>
 #include <iostream>
 
 #include <vsj_link.hpp>
 
+#include "expect.hpp"
+
 namespace {
-
-void expect(bool is_so, const std::string& what) {
-    if (is_so) return;
-    std::cerr << "expected: " << what << '\n';
-    std::exit(1);
-}
-
-std::string error_of(const std::function<void()>& work) {
-    try {
-        work();
-    } catch (const vsj::Error& error) {
-        return error.what();
-    }
-    return "";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 using vsj::Bytes;
 using vsj::wire::Writer;
