@@ -136,6 +136,16 @@ impl Readings {
         self.value[row] - self.value[row - 1]
     }
 
+    /// True if the reading turns back: the last two changes have opposite signs.
+    fn turns(&self, row: usize) -> bool {
+        self.change(row) * self.change(row - 1) < 0.0
+    }
+
+    /// True if all of some rows are free, of those that exist.
+    fn are_free(&self, rows: Range<usize>) -> bool {
+        self.free[rows.start..rows.end.min(self.free.len())].iter().all(|free| *free)
+    }
+
     /// Number of runs with a value.
     fn begins(&self, value: f64) -> usize {
         (1..self.value.len()).filter(|&row| self.equal(row, value) && !self.equal(row - 1, value)).count()
@@ -150,11 +160,11 @@ impl Readings {
 
     /// True if noise shows: readings turn back under a voltage that rests, or often if it never does.
     fn have_noise(&self) -> bool {
-        let triples = (2..self.value.len()).filter(|&row| self.free[row - 2..=row].iter().all(|free| *free));
+        let triples = (2..self.value.len()).filter(|&row| self.are_free(row - 2..row + 1));
         let rests = |row: &usize| self.voltage[row - 2..=*row].iter().all(|volts| *volts == self.voltage[*row]);
         let (at_rest, others): (Vec<usize>, Vec<usize>) = triples.partition(rests);
         let (rows, least) = if at_rest.len() < FEWEST_NEW { (others, TURNING) } else { (at_rest, NOISY) };
-        let turns = rows.iter().filter(|&&row| self.change(row) * self.change(row - 1) < 0.0).count();
+        let turns = rows.iter().filter(|&&row| self.turns(row)).count();
         turns as f64 > least * rows.len() as f64
     }
 
@@ -164,11 +174,9 @@ impl Readings {
         let jumps = |row: usize| {
             self.change(row).abs() > self.largest && self.rests(row.saturating_sub(MARGIN)..row + MARGIN + 1)
         };
-        let are_free =
-            |rows: Range<usize>| self.free[rows.start..rows.end.min(self.free.len())].iter().all(|free| *free);
         jumps(run.start)
-            && are_free(run.start.saturating_sub(2)..run.start)
-            && (run.end == self.value.len() || jumps(run.end) && are_free(run.end..run.end + 2))
+            && self.are_free(run.start.saturating_sub(2)..run.start)
+            && (run.end == self.value.len() || jumps(run.end) && self.are_free(run.end..run.end + 2))
     }
 
     /// True if there is noise before the run and after it, under the same voltage; if this changes with the end of the run, noise in other
@@ -177,11 +185,10 @@ impl Readings {
         let before = run.start.saturating_sub(BESIDE)..run.start;
         let after = run.end..(run.end + BESIDE).min(self.value.len());
         let has_noise = |rows: &Range<usize>| {
-            let turns = |row: usize| self.change(row) * self.change(row - 1) < 0.0;
             let [low, high] = range(&self.value[rows.clone()]);
             rows.len() == BESIDE
-                && self.free[rows.clone()].iter().all(|free| *free)
-                && (rows.start + 2..rows.end).any(turns)
+                && self.are_free(rows.clone())
+                && (rows.start + 2..rows.end).any(|row| self.turns(row))
                 && high - low > self.typical.max(LEAST_RANGE * self.smallest)
         };
         let ends_with_rest = after.is_empty() || !self.rests(run.end - 1..run.end + 1);
