@@ -130,8 +130,10 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
     let [low, high] = range(&rows.iter().map(|(_, _, value)| *value).collect::<Vec<_>>());
     let equal = |one: f64, other: f64| (one - other).abs() <= ROUNDING * (high - low);
     let repeats = |row: usize| row > 0 && equal(reading(row), reading(row - 1));
-    // A sensor at its bound and a spring at rest repeat readings as well.
-    let is_special = |value: f64| [low, high, 0.0].iter().any(|&special| equal(value, special));
+    // A sensor at its bound and a spring at rest repeat readings as well; outliers may be beyond the bound.
+    let bound = most_repeated((1..rows.len()).filter(|&row| repeats(row)).map(reading).collect(), equal);
+    let is_special =
+        |value: f64| [Some(low), Some(high), Some(0.0), bound].iter().flatten().any(|&special| equal(value, special));
     let changing: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || is_special(reading(row))).collect();
     let values: Vec<f64> = changing.iter().map(|&row| reading(row)).collect();
     let too_few = (rows.len() - changing.len()) < (LEAST_HELD.get() * rows.len() as f64) as usize;
@@ -141,7 +143,8 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
     }
     // A held reading may be the highest one, but a bound is reached again and again.
     let begins = |value: f64| (0..rows.len()).filter(|&row| equal(reading(row), value) && !repeats(row)).count();
-    let bounds: Vec<f64> = [low, high].into_iter().filter(|&extreme| begins(extreme) >= FEWEST_TIES.count()).collect();
+    let extremes = [Some(low), Some(high), bound].into_iter().flatten();
+    let bounds: Vec<f64> = extremes.filter(|&extreme| begins(extreme) >= FEWEST_TIES.count()).collect();
     let stays = |value: f64| bounds.iter().chain(&[0.0]).any(|&special| equal(value, special));
     let new: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || stays(reading(row))).collect();
     let count = rows.len() - new.len();
@@ -150,6 +153,13 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
         return None;
     }
     Some((reason(rows, &new, &changes(&values)), new))
+}
+
+/// Returns the value that more than half of some repeated readings have.
+fn most_repeated(mut repeated: Vec<f64>, equal: impl Fn(f64, f64) -> bool) -> Option<f64> {
+    repeated.sort_by(f64::total_cmp);
+    let middle = *repeated.get(repeated.len() / 2)?;
+    (2 * repeated.iter().filter(|&&value| equal(value, middle)).count() > repeated.len()).then_some(middle)
 }
 
 /// Returns the sizes of the changes between new readings under a voltage that rests, those after held readings or those without any.
@@ -303,7 +313,9 @@ mod tests {
             state += (row.voltage_v - state) / 3.0;
             row.measured = Some((1e3f64 * state).round() / 1e3);
         }
-        for record in [grid(0.01), grid(1.0), grid(4.0), grid(12.0), bound, smooth, record(|_, new, _| new)] {
+        let mut beyond = bound.clone();
+        (50..ROWS).step_by(150).for_each(|row| beyond.rows[row].measured = Some(500.0));
+        for record in [grid(0.01), grid(1.0), grid(4.0), grid(12.0), bound, beyond, smooth, record(|_, new, _| new)] {
             assert!(held(&record).is_none());
         }
     }

@@ -5,7 +5,8 @@
 //!
 //! - is preceded and followed by noise while the voltage rests, or
 //! - ends with a jump although the voltage has rested, as the reading catches up with the response, or
-//! - began before a change of the voltage after which the readings move elsewhere.
+//! - began before a change of the voltage after which the readings move elsewhere, or
+//! - begins and ends in the middle of a movement, while a voltage that never rests keeps changing as it does elsewhere.
 //!
 //! Of a sensor that sticks once, the other long runs are faults as well. So is one if the readings jump to one value and back from it by
 //! more than they ever change, while the voltage rests: a loose contact. At an end of the range, or at 0, only such jumps prove a fault,
@@ -47,6 +48,8 @@ const FEWEST_RESTS: usize = 2;
 /// Fewest places elsewhere that show how the readings move, and most that are looked at.
 const FEWEST_PLACES: usize = 5;
 const MOST_PLACES: usize = 10_000;
+/// Largest ratio of the sums of the voltage's changes at places that are alike.
+const ALIKE: f64 = 2.0;
 
 /// Readings of a record with what is typical of those that are not equal to their neighbours.
 struct Readings {
@@ -76,21 +79,25 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let runs = runs(value.len(), |row| (value[row] - value[row - 1]).abs() <= rounding);
     let readings = Readings::of(value, voltage, rounding, &runs)?;
     // The first readings may be those of a spring at rest in a simulation.
-    let (jumped, others): (Vec<_>, Vec<_>) =
-        runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
-    let shortest = shortest_stuck(&others);
-    let is_long = |run: &Range<usize>| shortest.is_some_and(|shortest| run.len() >= shortest);
-    let long: Vec<Range<usize>> = others.into_iter().filter(is_long).collect();
     let special = [low, high, 0.0].map(|value| (value, readings.begins(value)));
     let is_special = |run: &Range<usize>| special.iter().any(|(value, _)| readings.equal(run.start, *value));
-    let is_proved =
-        |run: &Range<usize>| readings.is_among_noise(run) || readings.catches_up(run) || readings.stays_behind(run);
-    let sticks = readings.have_noise() && long.iter().any(|run| !is_special(run) && is_proved(run));
     // With noise, a bound is reached again and again.
     let is_bound = |run: &Range<usize>| {
         special.iter().any(|(value, begins)| *begins >= FEWEST_TIES.count() && readings.equal(run.start, *value))
     };
-    let repeated = long.into_iter().filter(|run| sticks && !is_bound(run)).map(|run| run.start + 1..run.end);
+    let (jumped, others): (Vec<_>, Vec<_>) =
+        runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
+    let others: Vec<Range<usize>> = others.into_iter().filter(|run| !is_bound(run)).collect();
+    let shortest = shortest_stuck(&others).unwrap_or(usize::MAX);
+    let long: Vec<Range<usize>> = others.into_iter().filter(|run| run.len() >= shortest).collect();
+    let have_noise = readings.have_noise();
+    let is_proved = |run: &Range<usize>| {
+        let by_noise =
+            || readings.is_among_noise(run, shortest) || readings.catches_up_at_rest(run) || readings.stays_behind(run);
+        have_noise && by_noise() || readings.stops_in_a_movement(run)
+    };
+    let sticks = long.iter().any(|run| !is_special(run) && is_proved(run));
+    let repeated = long.into_iter().filter(|_| sticks).map(|run| run.start + 1..run.end);
     let faulty: Vec<Range<usize>> = jumped.into_iter().chain(repeated).collect();
     let mut is_faulty = vec![false; rows.len()];
     faulty.iter().for_each(|run| is_faulty[run.clone()].fill(true));
@@ -146,6 +153,11 @@ impl Readings {
         self.free[rows.start..rows.end.min(self.free.len())].iter().all(|free| *free)
     }
 
+    /// True if at least half of some rows are free.
+    fn are_mostly_free(&self, rows: &Range<usize>) -> bool {
+        2 * self.free[rows.clone()].iter().filter(|free| **free).count() >= rows.len()
+    }
+
     /// Number of runs with a value.
     fn begins(&self, value: f64) -> usize {
         (1..self.value.len()).filter(|&row| self.equal(row, value) && !self.equal(row - 1, value)).count()
@@ -179,31 +191,42 @@ impl Readings {
             && (run.end == self.value.len() || jumps(run.end) && self.are_free(run.end..run.end + 2))
     }
 
-    /// True if there is noise before the run and after it, under the same voltage; if this changes with the end of the run, noise in other
-    /// rests of the voltage stands for that after it.
-    fn is_among_noise(&self, run: &Range<usize>) -> bool {
+    /// True if there is noise before the run and after it, under the same voltage; if this changes before the end of the run, but after
+    /// the shortest of a stuck sensor, noise in other rests of the voltage stands for that after it.
+    fn is_among_noise(&self, run: &Range<usize>, shortest: usize) -> bool {
         let before = run.start.saturating_sub(BESIDE)..run.start;
         let after = run.end..(run.end + BESIDE).min(self.value.len());
         let has_noise = |rows: &Range<usize>| {
-            let [low, high] = range(&self.value[rows.clone()]);
             rows.len() == BESIDE
-                && self.are_free(rows.clone())
+                && self.are_mostly_free(rows)
                 && (rows.start + 2..rows.end).any(|row| self.turns(row))
-                && high - low > self.typical.max(LEAST_RANGE * self.smallest)
+                && self.moves(rows.clone())
         };
-        let ends_with_rest = after.is_empty() || !self.rests(run.end - 1..run.end + 1);
-        let is_followed =
-            if ends_with_rest { self.noisy_rests } else { self.rests(run.start..after.end) && has_noise(&after) };
-        self.rests(before.start..run.end) && has_noise(&before) && is_followed
+        let is_followed = if after.is_empty() || !self.rests(run.start..run.end + 1) {
+            self.noisy_rests && self.rests(before.start..run.start + shortest)
+        } else {
+            self.rests(before.start..after.end) && has_noise(&after)
+        };
+        has_noise(&before) && is_followed
     }
 
-    /// True if the run ends with a jump, and not with an outlier, after the voltage has rested for half of it.
-    fn catches_up(&self, run: &Range<usize>) -> bool {
+    /// True if the range of the readings in some rows is more than they typically change in one, and than a coarse one has at rest.
+    fn moves(&self, rows: Range<usize>) -> bool {
+        let [low, high] = range(&self.value[rows]);
+        high - low > self.typical.max(LEAST_RANGE * self.smallest)
+    }
+
+    /// True if the run ends with a jump of more than `least`, and not with an outlier.
+    fn catches_up(&self, run: &Range<usize>, least: f64) -> bool {
         let after = run.end + 1..(run.end + 1 + AFTER).min(self.value.len());
         run.end < self.value.len()
-            && self.change(run.end).abs() > MOVES * self.typical
-            && self.rests(run.start + run.len() / 2..run.end + 1)
+            && self.change(run.end).abs() > least
             && after.into_iter().all(|row| (self.value[row] - self.value[run.start]).abs() > self.typical)
+    }
+
+    /// True if the run ends with a jump after the voltage has rested for half of it.
+    fn catches_up_at_rest(&self, run: &Range<usize>) -> bool {
+        self.catches_up(run, MOVES * self.typical) && self.rests(run.start + run.len() / 2..run.end + 1)
     }
 
     /// True if the voltage changes in the first half of the run, and the readings elsewhere move in as many rows after such a change.
@@ -220,6 +243,37 @@ impl Readings {
         let mut moved: Vec<f64> =
             after_change.map(|row| (self.value[row + rows] - self.value[row - 1]).abs()).collect();
         moved.len() >= FEWEST_PLACES && median(&mut moved).is_some_and(|moved| moved > MOVES * self.typical)
+    }
+
+    /// True if the readings move right before the run and right after it, or jump at its end by more than they change elsewhere, and the
+    /// voltage changes in its first half and by as much as in places elsewhere, in the same range, where the readings move: a spring that
+    /// comes to rest, at a bound, in a dead zone or within a step of the sensor, slows down before, or stays there as well.
+    fn stops_in_a_movement(&self, run: &Range<usize>) -> bool {
+        let after = run.end..(run.end + BESIDE).min(self.value.len());
+        let stops = || run.start >= BESIDE && self.moves(run.start - BESIDE..run.start);
+        let goes_on = || after.len() < 2 || self.moves(after.clone());
+        let is_abrupt = stops() && goes_on() || self.catches_up(run, self.largest);
+        let changes = |start: usize| !self.rests(start..start + run.len() / 2);
+        if !is_abrupt || !changes(run.start) {
+            return false;
+        }
+        let [low, high] = range(&self.voltage[run.clone()]);
+        let voltages = low - self.change_v..=high + self.change_v;
+        let swept = self.swept(run);
+        let is_alike = |rows: &Range<usize>| {
+            (rows.end <= run.start || rows.start >= run.end)
+                && changes(rows.start)
+                && self.voltage[rows.clone()].iter().all(|volts| voltages.contains(volts))
+                && (swept / ALIKE..=swept * ALIKE).contains(&self.swept(rows))
+                && self.are_mostly_free(rows)
+        };
+        let starts = (1..self.value.len().saturating_sub(run.len())).step_by(self.value.len().div_ceil(MOST_PLACES));
+        starts.map(|start| start..start + run.len()).filter(is_alike).nth(FEWEST_PLACES - 1).is_some()
+    }
+
+    /// Sum of the voltage's changes in some rows, in V.
+    fn swept(&self, rows: &Range<usize>) -> f64 {
+        self.voltage[rows.clone()].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum()
     }
 }
 
@@ -242,13 +296,11 @@ fn shortest_stuck(runs: &[Range<usize>]) -> Option<usize> {
     let rows = lengths.iter().sum::<usize>() as f64;
     let (mut longest, mut repeats) = (0, 0);
     for length in lengths {
-        let (part, run) = (repeats.max(1) as f64 / rows, length as f64);
-        if run >= SHORTEST_RUN.get()
-            && longest as f64 <= OTHERS * run
-            && part < LEAST_HELD.get()
-            && rows * part.powf(run - 1.0) < BY_CHANCE
-        {
-            return Some(length);
+        let part = repeats.max(1) as f64 / rows;
+        let by_chance = 1.0 + (BY_CHANCE / rows).ln() / part.ln();
+        let least = SHORTEST_RUN.get().max(longest as f64 / OTHERS).max(by_chance).ceil() as usize;
+        if part < LEAST_HELD.get() && length >= least {
+            return Some(least);
         }
         (longest, repeats) = (length, repeats + length - 1);
     }
@@ -362,6 +414,60 @@ mod tests {
         record.rows.iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading.min(150.0)));
         [450, 470, 540, 599].into_iter().for_each(|row: usize| record.rows[row].measured = Some(-60.0));
         record
+    }
+
+    /// A chirp of up to 100 V whose voltage passes `by` before a lag of 8 rows, with noise, in V; readings in steps.
+    fn swept(noise_v: f64, step: f64, by: impl Fn(f64) -> f64) -> Record {
+        let mut state = 0.0;
+        let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
+            let at = row as f64 / ROWS as f64;
+            let voltage_v = 50.0 * (1.0 - (60.0 * at + 150.0 * at * at).cos());
+            state += (by(voltage_v) - state) / 8.0;
+            let measured = Some(((state + noise_v * noise) / step).round() * step);
+            Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured }
+        });
+        Record { name: String::new(), rows: rows.collect() }
+    }
+
+    #[test]
+    fn a_sensor_may_stick_while_the_voltage_keeps_changing() {
+        for (noise_v, step) in [(0.0, 1e-6), (0.05, 1e-6), (0.05, 0.02), (1.0, 0.4)] {
+            for runs in [[[701, 750]], [[1210, 1235]], [[1500, 1700]]] {
+                let stuck = stuck_in(&held_in(swept(noise_v, step, |volts| volts), &runs, None)).unwrap();
+                // On a coarse grid a good reading may equal the last of the run.
+                let [[from, to]] = runs;
+                let is_run = stuck.rows.iter().all(|row| (from - 2..to + 2).contains(row));
+                assert!(is_run && stuck.rows.len() >= to - from, "{noise_v} {step} {runs:?}: {:?}", stuck.rows);
+            }
+        }
+    }
+
+    /// The voltage changes after most of a run that began at rest; readings before it are equal by chance.
+    #[test]
+    fn a_sensor_may_stick_over_a_change_of_the_voltage() {
+        let mut record = noisy();
+        (708..711).for_each(|row| record.rows[row].measured = record.rows[707].measured);
+        let held = held_in(record, &[[716, 820]], None);
+        assert_eq!(stuck_in(&held).unwrap().rows, rows_of(&[[716, 820]]));
+    }
+
+    #[test]
+    fn a_good_sensor_of_a_spring_that_is_swept_is_not_stuck() {
+        let laws: [fn(f64) -> f64; 4] = [
+            |volts| volts,
+            |volts| volts.min(60.0),
+            |volts| (volts - 60.0).max(0.0),
+            |volts| if volts < 40.0 { volts } else { 40.0 + (volts - 60.0).max(0.0) },
+        ];
+        for law in laws {
+            for noise_v in [0.0, 0.05, 1.0] {
+                for step in [1e-9, 1e-3, 0.1, 1.0, 5.0, 20.0] {
+                    let record = swept(noise_v, step, law);
+                    let is_stuck = held(&record).is_some_and(|held| held.reason == Reason::Stuck);
+                    assert!(!is_stuck, "{noise_v} {step} {}", law(50.0));
+                }
+            }
+        }
     }
 
     #[test]
