@@ -193,6 +193,12 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Returns the form and the point at which the effect alone responds as it does at a point together with a gain; `None` if no form
+    /// includes a gain.
+    fn with_gain(&self, _form: usize, _point: &[f64], _gain: f64, _data: &Data) -> Option<(usize, Vec<f64>)> {
+        None
+    }
+
     /// Returns the logarithm of the number of independent candidates that a search for a form compares; the likelihood
     /// gain is reduced by this, in nats.
     fn ln_candidates(&self, _form: usize, _data: &Data) -> f64 {

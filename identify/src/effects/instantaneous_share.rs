@@ -85,12 +85,11 @@ impl Effect for InstantaneousShare {
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
-        if form != QUICK {
-            chain.relaxation.share = point[0];
-            return;
+        if form == QUICK {
+            chain.relaxation.take_from_first(Part { part: point[0], tau_s: point[1].exp() });
+        } else {
+            chain.relaxation.set_share(point[0]);
         }
-        chain.quick = Part { part: point[0], tau_s: point[1].exp() };
-        chain.set_further(chain.relaxation.further);
     }
 }
 
@@ -103,14 +102,34 @@ mod tests {
     use crate::record::input::Input;
     use simulation::record::{Record, Row};
 
+    fn data() -> Data {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
+        Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold)
+    }
+
     #[test]
     fn a_quick_part_stays_beside_creep() {
-        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
-        let data = Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold);
         let quick = Block { effect: index_of("instantaneous-share").unwrap(), form: QUICK };
         let creep = Block { effect: index_of("second-relaxation").unwrap(), form: 0 };
         let model = Model::default().with(quick, vec![0.07, 0.02f64.ln()]).with(creep, vec![0.2, 90f64.ln()]);
-        let parts = model.chain(&Base::paper(), &data).relaxation.further.map(|further| further.part);
-        assert_eq!(parts, [0.2, 0.07, 0.0]);
+        let times = model.chain(&Base::paper(), &data()).relaxation.further.map(|further| further.tau_s);
+        assert!((times[0] / 0.02 - 1.0).abs() < 1e-12 && (times[1] / 90.0 - 1.0).abs() < 1e-12, "{times:?}");
+    }
+
+    /// The lags of the nominal spring keep the ratios of their weights under another share and under creep.
+    #[test]
+    fn nominal_lags_stay_beside_another_share_and_creep() {
+        let mut file: simulation::plant_file::PlantFile = model::Plant::PAPER.into();
+        file.relaxation.share = 0.2;
+        file.relaxation.tau_s = vec![5.0, 40.0];
+        file.relaxation.weights = vec![0.6, 0.2];
+        let base = Base::new(file).unwrap();
+        let share = Block { effect: index_of("instantaneous-share").unwrap(), form: 0 };
+        let creep = Block { effect: index_of("second-relaxation").unwrap(), form: 0 };
+        let with_share = Model::default().with(share, vec![0.4]);
+        let parts = |model: &Model| model.chain(&base, &data()).relaxation.further.map(|further| further.part);
+        let near = |parts: [f64; 3], expected: [f64; 3]| parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(parts(&with_share), [0.15, 0.0, 0.0]));
+        assert!(near(parts(&with_share.with(creep, vec![0.2, 300f64.ln()])), [0.1, 0.2, 0.0]));
     }
 }

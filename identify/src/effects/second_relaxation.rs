@@ -107,6 +107,18 @@ impl Effect for SecondRelaxation {
         vec![Quantity::new("share", Dimension::Ratio, share), Quantity::new("tau_s", Dimension::Time, point[1].exp())]
     }
 
+    /// Creep of everything with a gain that restores what it takes is creep that is added.
+    fn with_gain(&self, form: usize, point: &[f64], gain: f64, data: &Data) -> Option<(usize, Vec<f64>)> {
+        let (form, ratio) = match form {
+            OF_THE_REST | OF_EVERYTHING => (ADDED, None),
+            BY_DECADES => (ADDED_BY_DECADES, Some(0.0)),
+            _ => return None,
+        };
+        let within = gain * point[0] * -(-data.duration_s() / point[1].exp()).exp_m1();
+        let point = [within, point[1]].into_iter().chain(ratio).collect();
+        (0.0..MOST_ADDED).contains(&within).then_some((form, point))
+    }
+
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {
         None
     }
@@ -121,23 +133,18 @@ impl Effect for SecondRelaxation {
         }
         let slow_s = point[1].exp();
         let tau_s = chain.relaxation.tau_s;
-        let parts = |times: &[f64]| {
-            let part = |&tau_s: &f64| Part { part: creep / times.len() as f64, tau_s };
-            std::array::from_fn(|index| times.get(index).map(part).unwrap_or_default())
+        let lags = |lags: &[(f64, f64)]| {
+            let sum: f64 = lags.iter().map(|(weight, _)| weight).sum();
+            lags.iter().map(|&(weight, tau_s)| Part { part: creep * weight / sum, tau_s }).collect::<Vec<Part>>()
         };
-        chain.set_further(match form {
-            OF_THE_REST | OF_EVERYTHING | ADDED => parts(&[slow_s]),
-            BY_DECADES => parts(&[0.1 * slow_s, slow_s, 10.0 * slow_s]),
-            ADDED_BY_DECADES => {
-                let ratio = point[2].exp();
-                let of_decade =
-                    |weight: f64, tau_s: f64| Part { part: creep * weight / (1.0 + ratio + ratio * ratio), tau_s };
-                [of_decade(1.0, 0.1 * slow_s), of_decade(ratio, slow_s), of_decade(ratio * ratio, 10.0 * slow_s)]
+        let lags = match form {
+            OF_THE_REST | OF_EVERYTHING | ADDED => lags(&[(1.0, slow_s)]),
+            BY_DECADES | ADDED_BY_DECADES => {
+                let ratio = point.get(2).map_or(1.0, |ln_ratio| ln_ratio.exp());
+                lags(&[(1.0, 0.1 * slow_s), (ratio, slow_s), (ratio * ratio, 10.0 * slow_s)])
             }
-            _ => parts(&[slow_s, tau_s * tau_s / slow_s]),
-        });
-        if !matches!(form, OF_THE_REST | SPREAD) {
-            chain.relaxation.share *= 1.0 - creep;
-        }
+            _ => lags(&[(1.0, slow_s), (1.0, tau_s * tau_s / slow_s)]),
+        };
+        chain.relaxation.add_lags(&lags, matches!(form, OF_THE_REST | SPREAD));
     }
 }

@@ -19,7 +19,7 @@ use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
-use crate::plant::relaxation::{FURTHER, Part, Relaxation};
+use crate::plant::relaxation::Relaxation;
 use crate::plant::restoring;
 use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
@@ -67,8 +67,6 @@ pub struct Chain<'a> {
     pub losses: Vec<Loss>,
     /// Feedthrough and lags from settled stiffness to stiffness.
     pub relaxation: Relaxation,
-    /// A further lag of the relaxation that stays when another effect replaces them; of weight 0 for none.
-    pub quick: Part,
     /// Time constants of lags in series with the relaxation, in s.
     pub series_s: Vec<f64>,
 }
@@ -107,17 +105,7 @@ impl<'a> Chain<'a> {
             law_behind: Law::of(None),
             losses: file.leakage.iter().map(Loss::of).collect(),
             relaxation,
-            quick: Part::default(),
             series_s: Vec::new(),
-        }
-    }
-
-    /// Replaces the further lags of the relaxation, and adds the quick one if there is room for it.
-    pub fn set_further(&mut self, further: [Part; FURTHER]) {
-        self.relaxation.further = further;
-        let free = self.relaxation.further.iter_mut().find(|further| further.part == 0.0);
-        if let Some(free) = free {
-            *free = self.quick;
         }
     }
 

@@ -104,6 +104,53 @@ impl Relaxation {
         tau.max(0.02 * self.tau_s)
     }
 
+    /// Multiplies the weights of all further lags and oscillations.
+    fn scale_weights(&mut self, factor: f64) {
+        self.further.iter_mut().for_each(|further| further.part *= factor);
+        for mode in &mut self.modes {
+            mode.weight *= factor;
+            mode.rate_weight *= factor;
+        }
+    }
+
+    /// Replaces the feedthrough; the lags and oscillations keep the ratios of their weights.
+    pub fn set_share(&mut self, share: f64) {
+        self.scale_rest(1.0 - share);
+        self.share = share;
+    }
+
+    /// Adds further lags with these weights, which the other lags and oscillations lose in proportion, and the feedthrough as well if it
+    /// is not `kept`. If there is no place for as many lags, they replace the further ones.
+    pub fn add_lags(&mut self, lags: &[Part], share_is_kept: bool) {
+        let part: f64 = lags.iter().map(|lag| lag.part).sum();
+        if share_is_kept {
+            self.scale_rest(1.0 - self.share - part);
+        } else {
+            self.scale_weights(1.0 - part);
+            self.share *= 1.0 - part;
+        }
+        if self.parts().count() + lags.len() > FURTHER {
+            self.further = Default::default();
+        }
+        let free = self.further.iter_mut().filter(|further| further.part == 0.0);
+        free.zip(lags).for_each(|(further, lag)| *further = *lag);
+    }
+
+    /// Adds a further lag whose weight the first one loses, if there is a place for it.
+    pub fn take_from_first(&mut self, lag: Part) {
+        if let Some(free) = self.further.iter_mut().find(|further| further.part == 0.0) {
+            *free = lag;
+        }
+    }
+
+    /// Scales the weights of lags and oscillations to a sum.
+    fn scale_rest(&mut self, sum: f64) {
+        let rest = 1.0 - self.share;
+        if rest != 0.0 {
+            self.scale_weights(sum / rest);
+        }
+    }
+
     /// Returns the further lags with a weight other than 0.
     pub fn parts(&self) -> impl Iterator<Item = Part> {
         self.further.into_iter().filter(|part| part.part != 0.0)
