@@ -110,6 +110,19 @@ fn a_slower_second_relaxation_does_not_trade_places_with_the_main_one() {
     assert_eq!(causes(&spring, &LOOPS), ["second-relaxation", "time-constant"]);
 }
 
+/// Creep that is added to the response is the same as creep of everything with a gain that restores what it takes.
+#[test]
+fn creep_that_is_added_is_not_a_gain_and_creep() {
+    for added in [0.06, 0.15] {
+        let whole = 1.0 + added;
+        let share = PAPER.share / whole;
+        let spring = Spring { gain: whole, share, slow: (added / whole / (1.0 - share), 40.0), ..PAPER };
+        assert_eq!(causes(&spring, &LOOPS), ["second-relaxation"]);
+    }
+    let spring = Spring { gain: 1.1, slow: (0.15, 40.0), ..PAPER };
+    assert_eq!(causes(&spring, &LOOPS), ["gain-error", "second-relaxation"]);
+}
+
 #[test]
 fn one_level_shows_no_curve() {
     let spring = Spring { gain: 1.1, tau_s: 7.0, ..PAPER };

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 
 use crate::adequacy;
-use crate::effects::EFFECTS;
 use crate::effects::effect::{FitContext, Location};
 use crate::effects::model::{Block, Model};
+use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
 use crate::search::first_fits::{Start, first_fits};
@@ -98,6 +98,11 @@ pub trait Evaluator {
     /// True if the residual of a finished search's best fit may hold structure, by the checks of the report as well.
     fn leaves_structure(&mut self, fit: &Fit) -> bool {
         self.doubts(fit)
+    }
+
+    /// Models in which one of the blocks includes the gain error of a model; none if it has no gain error.
+    fn merged(&self, _model: &Model) -> Vec<Model> {
+        Vec::new()
     }
 
     /// Factor by which prices are multiplied for the residual of a fit, 1 or more.
@@ -209,6 +214,17 @@ impl Evaluator for Engine<'_> {
 
     fn leaves_structure(&mut self, fit: &Fit) -> bool {
         self.doubts(fit) || adequacy::first_significant(self, fit).is_some()
+    }
+
+    fn merged(&self, model: &Model) -> Vec<Model> {
+        let Some(gain_error) = index_of("gain-error") else { return Vec::new() };
+        let Some(&[gain]) = model.point(gain_error) else { return Vec::new() };
+        let rest = model.without(gain_error);
+        let merged = |(block, point): &(Block, Vec<f64>)| {
+            let (form, point) = block.effect().with_gain(block.form, point, gain, self.data)?;
+            Some(rest.without(block.effect).with(Block { form, ..*block }, point))
+        };
+        rest.blocks.iter().filter_map(merged).collect()
     }
 
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {
