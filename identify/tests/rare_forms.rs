@@ -200,6 +200,17 @@ fn a_limit_of_the_amplifier_that_is_approached_gradually_has_a_knee() {
     assert!((value("limit_v") - 330.0).abs() < 5.0 && (10.0..40.0).contains(&value("knee_v")), "{report:#?}");
 }
 
+/// A sensor whose reading saturates gradually on both sides, and one that becomes more sensitive.
+#[test]
+fn a_curve_behind_the_relaxation_that_bends_evenly_is_found() {
+    let laws: [fn(f64) -> f64; 2] =
+        [|part| (3.0 * part).tanh() / 3f64.tanh(), |part| (2.5 * part).sinh() / 2.5f64.sinh()];
+    for law in laws {
+        let report = with_added(|_, response| FULL_SCALE_V * law(response / FULL_SCALE_V) - response);
+        of_only_finding(&report, "static-nonlinearity", "at_100_v");
+    }
+}
+
 /// Checks that the converter is all that is wrong, and returns its step.
 fn step_of_converter(report: &Report) -> f64 {
     let causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();

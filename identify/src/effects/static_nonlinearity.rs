@@ -7,6 +7,7 @@
 //! | quadratic, cubic, quintic | `1 + a (x - X)`, `+ b (x^2 - X^2)`, `+ c (x^3 - X^3) + d (x^4 - X^4)` |
 //! | power | `(x / X)^(p - 1)`: a square root, a square (electrostriction) |
 //! | kink | `s(x) / s(X)` with `s(x) = (a min(x, k) + max(x - k, 0)) / x`: a dead band, a contact |
+//! | bent | `s(x) / s(X)` with `s(x) = (1 + c x^2)^-p`: near a hyperbolic tangent, an arc tangent, a Langevin function, or for `p < 0` a hyperbolic sine |
 //! | uneven | as cubic with the sign of the voltage, `x = u / full scale`: other curves for negative voltages |
 //!
 //! Every curve is fixed at 0 V and at the reference voltage of the nominal spring, where the static gain is 1: what is linear
@@ -37,10 +38,11 @@ enum Curve {
     Polynomial(usize),
     Power,
     Kink,
+    Bent,
     /// The polynomial with two free coefficients of the voltage with its sign.
     Uneven,
 }
-use Curve::{Exponential, Kink, Polynomial, Power, Uneven};
+use Curve::{Bent, Exponential, Kink, Polynomial, Power, Uneven};
 
 /// Place of a curve.
 #[derive(Clone, Copy, PartialEq)]
@@ -55,7 +57,7 @@ enum Place {
 use Place::{Before, Behind, Within};
 
 /// Curve of each form, and its place.
-const FORMS: [(Curve, Place); 13] = [
+const FORMS: [(Curve, Place); 16] = [
     (Polynomial(1), Before),
     (Exponential, Before),
     (Polynomial(2), Before),
@@ -69,6 +71,9 @@ const FORMS: [(Curve, Place); 13] = [
     (Uneven, Before),
     (Polynomial(2), Within),
     (Power, Within),
+    (Bent, Before),
+    (Bent, Behind),
+    (Power, Behind),
 ];
 
 /// Smallest `x` of a power, which may have no finite slope at 0.
@@ -103,6 +108,7 @@ impl Curve {
                 let [place, slope] = [point[0], point[1]];
                 if x < place { slope } else { 1.0 + (slope - 1.0) * place / x }
             }
+            Bent => (1.0 + point[0].exp() * x * x).powf(-point[1]),
             Polynomial(_) | Uneven => x * point.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient),
         }
     }
@@ -112,7 +118,7 @@ impl Curve {
         match self {
             Polynomial(_) | Uneven => 1.0 + s - fixed,
             Kink => s / fixed.max(LEAST_OF_KINK),
-            Exponential | Power => s / fixed,
+            Exponential | Power | Bent => s / fixed,
         }
     }
 
@@ -121,7 +127,7 @@ impl Curve {
         match self {
             Exponential | Power => 1,
             Polynomial(coefficients) => coefficients,
-            Kink | Uneven => 2,
+            Kink | Bent | Uneven => 2,
         }
     }
 }
@@ -218,6 +224,7 @@ impl Effect for StaticNonlinearity {
             (Polynomial(coefficients), _) => vec![Coordinate::new(-100.0, 100.0); coefficients],
             (Uneven, _) => vec![Coordinate::new(-2.0, 2.0); 2],
             (Power, _) => vec![Coordinate::new(0.2, 5.0)],
+            (Bent, _) => vec![Coordinate::log(0.01, 100.0), Coordinate::new(-5.0, 5.0)],
             (Kink, _) => vec![Coordinate::new(0.01, 0.95), Coordinate::new(0.0, 10.0)],
         }
     }
@@ -233,6 +240,7 @@ impl Effect for StaticNonlinearity {
         match curve {
             Exponential => vec![vec![0.3], vec![-0.3]],
             Power => vec![vec![0.9], vec![1.1]],
+            Bent => [0.2, 2.0].iter().flat_map(|&c: &f64| [0.3, -0.3].map(|p| vec![c.ln(), p])).collect(),
             Kink => INITIAL_KINKS.iter().flat_map(|&place| INITIAL_SLOPES.map(|slope| vec![place, slope])).collect(),
             Uneven => vec![vec![0.1, 0.0], vec![-0.1, 0.0]],
             Polynomial(1) => vec![vec![0.1], vec![-0.1]],
