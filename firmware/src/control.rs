@@ -4,7 +4,7 @@
 
 use link::{Command, WireModel};
 use model::estimator::{Estimator, Model};
-use model::supervisor::{self, Decision, Drive, Fault, Inputs, Monitors, Supervisor};
+use model::supervisor::{self, Decision, Drive, Fault, Faults, Inputs, Monitors, Supervisor};
 use model::{
     Config, ExtendedPlant, Input, OutOfRange, Output, ScaledStiffness, Settings, State, Validated, Volts, estimator,
     extended,
@@ -22,8 +22,8 @@ pub struct Sensors {
     pub missed_ticks: u32,
     /// Readings of the amplifier's monitors; `None` without monitors.
     pub monitors: Option<Monitors>,
-    /// Fault detected outside of the tick, for example by the task watchdog.
-    pub fault: Option<Fault>,
+    /// Faults detected outside of the tick, for example by the task watchdog, whose causes are there in this tick.
+    pub faults: Faults,
     /// Reading of the stiffness sensor, as equivalent static voltage, sampled after the output of the last tick; `None` without
     /// a new reading.
     pub measured: Option<Volts>,
@@ -186,7 +186,7 @@ impl Control {
             interlock_closed: sensors.interlock_closed,
             missed_ticks: sensors.missed_ticks,
             monitors: sensors.monitors,
-            fault: sensors.fault,
+            faults: sensors.faults,
         });
         let target = match decision {
             Decision::Rest => Volts::ZERO,

@@ -64,11 +64,12 @@ pub async fn control<B: Board>(
             isolation.acknowledge();
         }
         let cause = isolation.begin(&command, control.supervisor().state());
+        let stalled = (incomplete > timing.incomplete_ticks).then_some(Fault::Watchdog);
         let sensors = Sensors {
             interlock_closed: board.interlock_closed(),
             missed_ticks: arrival.missed_ticks,
             monitors: board.amplifier().monitors(),
-            fault: (incomplete > timing.incomplete_ticks).then_some(Fault::Watchdog).or(board.fault()).or(cause),
+            faults: stalled.into_iter().chain(board.fault()).chain(cause).collect(),
             measured: board.amplifier().measured(),
         };
         let tick = control.tick(&command, &sensors, stopwatch);

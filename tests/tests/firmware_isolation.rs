@@ -102,8 +102,8 @@ fn run_with(change: Happens, trip_on_cause: Causes, adapts: bool) -> Run {
         };
         let target = Some(Volts::new(f64::from(up_down_v(tick))).unwrap());
         let command = Command { heard: true, arming, target };
-        let fault = isolation.begin(&command, state);
-        let sensors = Sensors { interlock_closed: true, measured, fault, ..Sensors::default() };
+        let faults = isolation.begin(&command, state).into_iter().collect();
+        let sensors = Sensors { interlock_closed: true, measured, faults, ..Sensors::default() };
         let done = control.tick(&command, &sensors, &mut Untimed);
         if let Some(news) = isolation.tick(&control, &done)
             && news.report.verdict != last

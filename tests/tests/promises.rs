@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use firmware::LONGEST_HANG_MS;
 use firmware::settings::{LONGEST_STALL_MS, SUPERVISION, WATCHDOG_MS};
 use link::{Field, Reason};
-use model::supervisor::{Command, Fault, Inputs, Monitors, State, Supervisor};
+use model::supervisor::{Command, Fault, Faults, Inputs, Monitors, State, Supervisor};
 use model::units::SampleTime;
 use model::{Config, Input, Settings, Volts};
 use test_bench::script::FaultInjection;
@@ -235,12 +235,12 @@ fn reaction(fault: Fault, state: &str) -> &'static str {
             let voltage = Volts::new(900.0).unwrap();
             inputs.monitors = Some(Monitors { voltage, current_ua: 0, supply_mv: None });
         }
-        _ => inputs.fault = Some(fault),
+        _ => inputs.faults = Faults::NONE.with(fault),
     }
     for _ in 0..2000 {
         tick(&mut supervisor, &inputs);
     }
-    let stands = supervisor.standing() != supervisor.standing().without(fault);
+    let stands = supervisor.standing().contains(fault);
     match (before, supervisor.state(), stands) {
         (State::Faulted(_), _, true) => "stands as well",
         (_, State::Faulted(shown), true) if shown == fault => "faulted",

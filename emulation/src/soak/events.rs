@@ -4,7 +4,7 @@
 use firmware::control::{Sensors, Tick};
 use link::Command;
 use model::Volts;
-use model::supervisor::{Command as Arming, Fault, Monitors};
+use model::supervisor::{Command as Arming, Fault, Faults, Monitors};
 use model::units::Signal;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -19,14 +19,14 @@ pub(super) struct Event {
     pub(super) late_us: u32,
     interlock_closed: bool,
     monitors: Option<Monitors>,
-    fault: Option<Fault>,
+    faults: Faults,
     measured: Option<Volts>,
 }
 
 impl Event {
     pub(super) fn sensors(&self, missed_ticks: u32) -> Sensors {
-        let Self { interlock_closed, monitors, fault, measured, .. } = *self;
-        Sensors { interlock_closed, missed_ticks, monitors, fault, measured }
+        let Self { interlock_closed, monitors, faults, measured, .. } = *self;
+        Sensors { interlock_closed, missed_ticks, monitors, faults, measured }
     }
 }
 
@@ -108,7 +108,7 @@ impl Events {
             late_us: if happens(first, 3, phase.late) { self.lateness() } else { 0 },
             interlock_closed: !happens(second, 1, phase.open),
             monitors: self.monitors(happens(second, 2, phase.monitor)),
-            fault: happens(second, 3, phase.fault).then(|| self.random.random_range(1..=8)).and_then(Fault::from_code),
+            faults: if happens(second, 3, phase.fault) { self.faults() } else { Faults::NONE },
             measured: if self.sensor { self.reading(second as i32 >> 12) } else { None },
         }
     }
@@ -137,6 +137,13 @@ impl Events {
             monitor,
             reading,
         }
+    }
+
+    /// One fault of any code, or two.
+    fn faults(&mut self) -> Faults {
+        (0..self.random.random_range(1..=2))
+            .map(|_| Fault::ALL[self.random.random_range(0..Fault::ALL.len())])
+            .collect()
     }
 
     /// Mostly some ticks, sometimes up to 71 minutes.

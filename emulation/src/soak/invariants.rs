@@ -148,7 +148,7 @@ impl Watch {
         ensure(drive.enabled() == armed, || format!("{drive:?} in {state:?}"))?;
         ensure(armed || *drive == Drive::SAFE, || format!("{drive:?} in {state:?}"))?;
         ensure(!armed || sensors.interlock_closed, || "armed with an open interlock".into())?;
-        ensure(!armed || sensors.fault.is_none(), || format!("armed with {:?}", sensors.fault))?;
+        ensure(!armed || sensors.faults == Faults::NONE, || format!("armed with {:?}", sensors.faults))?;
         ensure(!armed || self.silent <= self.longest_silence, || format!("armed after {} silent ticks", self.silent))?;
         match state {
             State::Faulted(shown) => {

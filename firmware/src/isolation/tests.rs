@@ -46,8 +46,8 @@ impl Rig {
     /// One tick with a command and a target, in V.
     pub(crate) fn tick(&mut self, arming: Option<supervisor::Command>, target_v: f64) -> (Tick, Option<News>) {
         let command = Command { heard: true, arming, target: Some(Volts::new(target_v).unwrap()) };
-        let fault = self.isolation.begin(&command, self.control.supervisor().state());
-        let sensors = Sensors { interlock_closed: true, measured: self.measured, fault, ..Sensors::default() };
+        let faults = self.isolation.begin(&command, self.control.supervisor().state()).into_iter().collect();
+        let sensors = Sensors { interlock_closed: true, measured: self.measured, faults, ..Sensors::default() };
         let tick = self.control.tick(&command, &sensors, &mut Untimed);
         let news = self.isolation.tick(&self.control, &tick);
         let Plant { share, time_constant_s, .. } = Plant::PAPER;

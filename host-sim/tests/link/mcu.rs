@@ -319,11 +319,11 @@ impl Chip {
 
     fn tick(&mut self, command: Command) {
         let heard = self.server.take_heard() || command.heard;
-        let (interlock_closed, fault) = {
+        let (interlock_closed, faults) = {
             let mut shared = self.shared.lock().unwrap();
-            (!shared.interlock_open, shared.fault.take())
+            (!shared.interlock_open, shared.fault.take().into_iter().collect())
         };
-        let sensors = Sensors { interlock_closed, fault, ..Sensors::default() };
+        let sensors = Sensors { interlock_closed, faults, ..Sensors::default() };
         let tick = self.control.tick(&Command { heard, ..command }, &sensors, &mut Untimed);
         let supervisor = self.control.supervisor();
         let sample = Telemetry {

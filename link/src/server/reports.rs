@@ -104,7 +104,7 @@ mod tests {
         View {
             sample: Telemetry { tick, ..Telemetry::default() },
             state: faults.first().map_or(State::Disarmed, |fault| State::Faulted(*fault)),
-            standing: faults.iter().copied().fold(Faults::NONE, Faults::with),
+            standing: faults.iter().copied().collect(),
             refusal: None,
             overruns: 0,
         }

@@ -136,13 +136,24 @@ impl Faults {
         Self(self.0 & !others.0)
     }
 
+    /// Returns true if `fault` is in the set.
+    pub const fn contains(self, fault: Fault) -> bool {
+        self.0 & Self::bit(fault) != 0
+    }
+
     /// Returns the faults of the set in the order of their numbers.
     pub fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::ALL.into_iter().filter(move |fault| self.0 & Self::bit(*fault) != 0)
+        Fault::ALL.into_iter().filter(move |fault| self.contains(*fault))
     }
 
     const fn bit(fault: Fault) -> u16 {
         1 << (fault.code() - 1)
+    }
+}
+
+impl FromIterator<Fault> for Faults {
+    fn from_iter<T: IntoIterator<Item = Fault>>(faults: T) -> Self {
+        faults.into_iter().fold(Self::NONE, Self::with)
     }
 }
 
@@ -158,7 +169,8 @@ mod tests {
         assert_eq!(Faults::from_bits(0xfc81), both, "bits without a fault are dropped");
         assert_eq!(both.without(Fault::Panic).without(Fault::Panic), Faults::from_bits(0x80));
         assert_eq!(both.except(Faults::NONE.with(Fault::Supply)), Faults::from_bits(1));
-        assert_eq!(Fault::ALL.into_iter().fold(Faults::NONE, Faults::with).iter().count(), Fault::ALL.len());
+        assert!(both.contains(Fault::Supply) && !both.contains(Fault::Interlock));
+        assert_eq!(Fault::ALL.into_iter().collect::<Faults>().iter().count(), Fault::ALL.len());
     }
 
     #[test]

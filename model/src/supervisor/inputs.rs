@@ -1,6 +1,6 @@
 //! Inputs of the supervisor in one tick.
 
-use super::fault::Fault;
+use super::fault::Faults;
 use super::monitors::Monitors;
 use crate::units::Volts;
 
@@ -28,9 +28,9 @@ pub struct Inputs {
     pub missed_ticks: u32,
     /// Readings of the amplifier's monitors; `None` if it has none.
     pub monitors: Option<Monitors>,
-    /// Fault that another part of the program finds in this tick, and in each tick until its cause is gone: a task
-    /// that does not check in, rejected settings.
-    pub fault: Option<Fault>,
+    /// Faults that other parts of the program find in this tick, and in each tick until their causes are gone: a task
+    /// that does not check in, a named cause, rejected settings, a failed test of the hardware.
+    pub faults: Faults,
 }
 
 impl Default for Inputs {
@@ -43,7 +43,7 @@ impl Default for Inputs {
             interlock_closed: false,
             missed_ticks: 0,
             monitors: None,
-            fault: None,
+            faults: Faults::NONE,
         }
     }
 }

@@ -205,8 +205,8 @@ impl Supervisor {
         let was_armed = self.state == State::Armed;
         let overrun = self.overrun(inputs.missed_ticks);
         let disagreement = self.monitors.update(&self.config, inputs.monitors);
-        if let Some(fault) = inputs.fault {
-            self.fail(fault);
+        if inputs.faults != Faults::NONE {
+            inputs.faults.iter().for_each(|fault| self.fail(fault));
         }
         if was_armed && !inputs.interlock_closed {
             self.fail(Fault::Interlock);
@@ -299,7 +299,7 @@ impl Supervisor {
             Fault::Overrun => self.misses > 0,
             _ => false,
         };
-        (present || inputs.fault == Some(fault)).then_some(Refusal::CausePresent)
+        (present || inputs.faults.contains(fault)).then_some(Refusal::CausePresent)
     }
 
     /// Returns what the monitors have against arming and acknowledging.

@@ -9,9 +9,10 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
     ];
     let supply = prop_oneof![3 => Just(None), 2 => Just(Some(3300)), 1 => any::<u16>().prop_map(Some)];
     let monitors = prop_oneof![3 => Just(None), 1 => (any::<i32>(), any::<i32>(), supply).prop_map(Some)];
-    let fault = prop_oneof![30 => Just(None), 1 => (0..Fault::ALL.len()).prop_map(|i| Some(Fault::ALL[i]))];
-    (command, any::<i32>(), prop_oneof![0..1000u32, any::<u32>()], 0..20u8, 0..40u32, monitors, fault).prop_map(
-        |(command, target, ticks_since_host, interlock, missed, monitors, fault)| Inputs {
+    let faults = prop_oneof![30 => Just(0), 1 => (0..Fault::ALL.len()).prop_map(|i| 1 << i), 1 => any::<u16>()];
+    let faults = faults.prop_map(Faults::from_bits);
+    (command, any::<i32>(), prop_oneof![0..1000u32, any::<u32>()], 0..20u8, 0..40u32, monitors, faults).prop_map(
+        |(command, target, ticks_since_host, interlock, missed, monitors, faults)| Inputs {
             command,
             target: Volts(Signal::from_bits(target)),
             ticks_since_host,
@@ -22,7 +23,7 @@ fn any_inputs() -> impl Strategy<Value = Inputs> {
                 current_ua: current >> 12,
                 supply_mv,
             }),
-            fault,
+            faults,
         },
     )
 }
@@ -45,7 +46,7 @@ proptest! {
             prop_assert_eq!(drive.enabled(), armed);
             prop_assert_eq!(decision == Decision::Rest, !armed);
             prop_assert!(armed || drive == Drive::SAFE);
-            prop_assert!(!(armed && (!inputs.interlock_closed || inputs.fault.is_some())));
+            prop_assert!(!(armed && (!inputs.interlock_closed || inputs.faults != Faults::NONE)));
             if armed && before != State::Armed {
                 prop_assert_eq!((before, inputs.command, live), (State::Disarmed, Some(Command::Arm), false));
             }
@@ -55,14 +56,12 @@ proptest! {
                 _ => prop_assert_eq!(standing, Faults::NONE),
             }
             for gone in stood.except(standing).iter() {
-                let cause = inputs.fault == Some(gone) || (gone == Fault::Interlock && !inputs.interlock_closed);
+                let cause = inputs.faults.contains(gone) || (gone == Fault::Interlock && !inputs.interlock_closed);
                 prop_assert!(before == State::Faulted(gone) && !cause && !live);
                 prop_assert_eq!(inputs.command, Some(Command::Disarm));
                 prop_assert_eq!(stood.without(gone).except(standing), Faults::NONE, "no other goes with it");
             }
-            if let Some(fault) = inputs.fault {
-                prop_assert_eq!(standing, standing.with(fault), "it stands");
-            }
+            prop_assert_eq!(inputs.faults.except(standing), Faults::NONE, "they stand");
         }
     }
 }

@@ -57,7 +57,7 @@ fn an_open_interlock_is_a_fault_only_while_armed() {
 fn a_fault_stays_until_it_is_acknowledged_and_arming_needs_another_command() {
     for fault in Fault::ALL {
         let mut supervisor = armed();
-        let bad = Inputs { fault: Some(fault), ..good() };
+        let bad = Inputs { faults: Faults::NONE.with(fault), ..good() };
         assert_eq!(tick(&mut supervisor, bad), (Decision::Rest, Drive::SAFE), "in the same tick");
         for _ in 0..10_000 {
             assert_eq!(tick(&mut supervisor, arm()).1, Drive::SAFE);
@@ -75,7 +75,7 @@ fn a_second_fault_is_neither_lost_nor_cleared_by_one_acknowledgement() {
     let both = Faults::NONE.with(Fault::Interlock).with(Fault::Panic);
     let mut supervisor = armed();
     tick(&mut supervisor, Inputs { interlock_closed: false, ..good() });
-    tick(&mut supervisor, Inputs { fault: Some(Fault::Panic), ..good() });
+    tick(&mut supervisor, Inputs { faults: Faults::NONE.with(Fault::Panic), ..good() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Interlock), "the first one is shown");
     assert_eq!(supervisor.standing(), both);
     tick(&mut supervisor, disarm());
@@ -89,7 +89,8 @@ fn a_second_fault_is_neither_lost_nor_cleared_by_one_acknowledgement() {
 #[test]
 fn faults_of_the_same_tick_all_stand() {
     let mut supervisor = armed();
-    let both = Inputs { interlock_closed: false, missed_ticks: 6, fault: Some(Fault::Watchdog), ..good() };
+    let both =
+        Inputs { interlock_closed: false, missed_ticks: 6, faults: Faults::NONE.with(Fault::Watchdog), ..good() };
     tick(&mut supervisor, both);
     assert_eq!(supervisor.state(), State::Faulted(Fault::Watchdog));
     assert!(supervisor.standing().iter().eq([Fault::Overrun, Fault::Interlock, Fault::Watchdog]));
@@ -105,7 +106,7 @@ fn a_fault_is_not_acknowledged_while_its_cause_is_there() {
         let with_cause = |inputs| match fault {
             Fault::Interlock => Inputs { interlock_closed: false, ..inputs },
             Fault::Overrun => Inputs { missed_ticks: 6, ..inputs },
-            _ => Inputs { fault: Some(fault), ..inputs },
+            _ => Inputs { faults: Faults::NONE.with(fault), ..inputs },
         };
         let mut supervisor = armed();
         tick(&mut supervisor, with_cause(good()));
@@ -123,6 +124,18 @@ fn a_fault_is_not_acknowledged_while_its_cause_is_there() {
     }
 }
 
+/// A fault with a lower number is reported as well.
+#[test]
+fn no_other_reported_fault_hides_a_cause_that_is_there() {
+    let with = |inputs, faults: [Fault; 2]| Inputs { faults: faults.into_iter().collect(), ..inputs };
+    let mut supervisor = Supervisor::new(config(), Some(Fault::SelfTest));
+    tick(&mut supervisor, with(good(), [Fault::Watchdog, Fault::SelfTest]));
+    assert!(supervisor.standing().iter().eq([Fault::Watchdog, Fault::SelfTest]));
+    tick(&mut supervisor, with(disarm(), [Fault::Watchdog, Fault::SelfTest]));
+    assert_eq!(supervisor.state(), State::Faulted(Fault::SelfTest));
+    assert_eq!(supervisor.refusal(), Some(Refusal::CausePresent));
+}
+
 #[test]
 fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
     let mut supervisor = armed();
@@ -132,7 +145,7 @@ fn a_disarm_of_the_same_tick_does_not_acknowledge_a_fault() {
     tick(&mut supervisor, Inputs { missed_ticks: 6, ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Overrun));
     let mut supervisor = Supervisor::new(config(), None);
-    tick(&mut supervisor, Inputs { fault: Some(Fault::Config), ..disarm() });
+    tick(&mut supervisor, Inputs { faults: Faults::NONE.with(Fault::Config), ..disarm() });
     assert_eq!(supervisor.state(), State::Faulted(Fault::Config));
 }
 
