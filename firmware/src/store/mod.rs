@@ -129,14 +129,7 @@ impl<P: Pages> Store<P> {
     /// cut in the last word of a page, or while one is erased, it cannot be known, and may count as damaged; an erased page and one
     /// of another program do not.
     pub fn is_damaged(&self, block: Block) -> bool {
-        let newest = self.newest(block).map(|(id, _)| id.number);
-        let broken = |side| {
-            let page = self.pages.bytes(Page { block, side });
-            if open(block, page).is_some() { None } else { sealed_number(block, page) }
-        };
-        let broken = self.pages.tolerate_bit_errors(|| [Side::A, Side::B].map(broken));
-        // A page with a smaller number is one whose erasure a power cut has interrupted.
-        broken.into_iter().flatten().any(|number| newest.is_none_or(|newest| number == newest.wrapping_add(1)))
+        self.damaged(block).is_some()
     }
 
     /// Writes part `number` of a block's new content. Part 0 starts a new transfer; one of another block ends there.
@@ -217,10 +210,23 @@ impl<P: Pages> Store<P> {
         }
     }
 
+    /// The damaged page of [`Store::is_damaged`].
+    fn damaged(&self, block: Block) -> Option<Side> {
+        let newest = self.newest(block).map(|(id, _)| id.number);
+        let is_damaged = |side: &Side| was_sealed(block, self.pages.bytes(Page { block, side: *side }), newest);
+        self.pages.tolerate_bit_errors(|| [Side::A, Side::B].into_iter().find(is_damaged))
+    }
+
+    /// The page for new content. A damaged one stays until the new content is sealed, so that a power cut does not hide the damage;
+    /// what is valid beside it does not drive the output any more.
     fn unused(&self, block: Block) -> Page {
-        Page { block, side: self.find(block).map_or(Side::A, |(side, ..)| side.other()) }
+        let kept = self.damaged(block).or(self.find(block).map(|(side, ..)| side));
+        Page { block, side: kept.map_or(Side::A, Side::other) }
     }
 }
+
+/// Most wrong bits of a mark that is taken for a damaged one. The marks of the two blocks differ in four, and an erased page in more.
+const WRONG_BITS: u32 = 3;
 
 /// What a page begins with: a page of one block is none of the other.
 const fn mark(block: Block) -> [u8; 4] {
@@ -247,20 +253,31 @@ fn header(block: Block, id: &BlockId) -> [[u8; WORD]; 2] {
 
 /// The content and payload of a block's page, if it is sealed.
 fn open(block: Block, page: &[u8; PAGE]) -> Option<(BlockId, &[u8])> {
-    let ([first, last], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
-    let [n0, n1, n2, n3, ..] = *last;
+    let ([_, [n0, n1, n2, n3, ..]], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
+    open_as(block, page, u32::from_le_bytes([*n0, *n1, *n2, *n3]))
+}
+
+/// The content and payload of a block's page, if it was sealed with this number.
+fn open_as(block: Block, page: &[u8; PAGE], number: u32) -> Option<(BlockId, &[u8])> {
+    let ([first, [_, _, _, _, seal @ ..]], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
     let [.., l0, l1, _, _] = *first;
     let length = usize::from(u16::from_le_bytes([l0, l1]));
     let payload = page.get(HEADER..HEADER + length)?;
-    let id = BlockId::of(u32::from_le_bytes([n0, n1, n2, n3]), payload);
-    (header(block, &id) == [*first, *last]).then_some((id, payload))
+    let id = BlockId::of(number, payload);
+    let [is, [_, _, _, _, sealed @ ..]] = header(block, &id);
+    (is == *first && sealed == *seal).then_some((id, payload))
 }
 
-/// The number of a block's page that has its mark and a seal, correct or not.
-fn sealed_number(block: Block, page: &[u8; PAGE]) -> Option<u32> {
-    let ([first, last], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
-    let [n0, n1, n2, n3, ..] = *last;
-    (first.starts_with(&mark(block)) && *last != [0xff; WORD]).then(|| u32::from_le_bytes([n0, n1, n2, n3]))
+/// Whether a block's page that is not valid was sealed with content newer than that with the number `newest`, the valid one.
+fn was_sealed(block: Block, page: &[u8; PAGE], newest: Option<u32>) -> bool {
+    let Some(([first, last], _)) = page.as_chunks::<WORD>().0.split_first_chunk() else { return false };
+    let wrong_bits: u32 = first.iter().zip(mark(block)).map(|(is, should)| (is ^ should).count_ones()).sum();
+    if *last == [0xff; WORD] || wrong_bits > WRONG_BITS || open(block, page).is_some() {
+        return false;
+    }
+    // A page with a smaller number is one whose erasure a power cut has interrupted, unless it is right with the next number.
+    let Some(next) = newest.map(|newest| newest.wrapping_add(1)) else { return true };
+    last.starts_with(&next.to_le_bytes()) || open_as(block, page, next).is_some()
 }
 
 #[cfg(test)]

@@ -120,15 +120,12 @@ fn is_damaged(flash: &Flash, block: Block) -> bool {
     Store::new(flash.clone()).is_damaged(block)
 }
 
-/// Every single bit of a sealed page: with it wrong, the content before is valid, or none, and that is known. Not known is only
-/// that the page was one of this block, or that its content was newer than the valid one.
+/// Every single bit of a sealed page: with it wrong, the content before is valid, or none, and that is known.
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_damaged_page_is_neither_valid_nor_taken_for_an_erased_one() {
     let (first, _) = store_block(&Flash::BLANK, Settings, &payload(1), Ok(()));
     let (second, _) = store_block(&first, Settings, &payload(2), Ok(()));
-    let is_mark = |bit: usize| bit < 8 * 4;
-    let is_number = |bit: usize| (8 * WORD..8 * (WORD + 4)).contains(&bit);
     for (flash, page, old) in [(&first, 2, None), (&second, 3, Some(payload(1)))] {
         assert!(!is_damaged(flash, Settings) && !is_damaged(flash, Model));
         let end = 8 * (HEADER + newest_block(flash, Settings).unwrap().len());
@@ -136,14 +133,49 @@ fn a_damaged_page_is_neither_valid_nor_taken_for_an_erased_one() {
             let mut damaged = flash.clone();
             damaged.pages[page][bit / 8] ^= 1 << (bit % 8);
             assert_eq!(newest_block(&damaged, Settings), old, "bit {bit}");
-            let is_unknown = is_mark(bit) || (is_number(bit) && old.is_some());
-            assert_eq!(is_damaged(&damaged, Settings), !is_unknown, "bit {bit}");
+            assert!(is_damaged(&damaged, Settings), "bit {bit}");
             assert!(!is_damaged(&damaged, Model));
         }
     }
     let zeros = Flash { pages: [[0; PAGE]; PAGES], ..Flash::BLANK };
     for flash in [Flash::BLANK, zeros] {
         assert!(!is_damaged(&flash, Settings) && !is_damaged(&flash, Model), "nothing was stored");
+    }
+}
+
+/// Three bits of the mark and all of the number, or of the payload.
+#[test]
+fn several_wrong_bits_of_mark_and_number_are_damage_and_a_foreign_mark_is_none() {
+    let (first, _) = store_block(&Flash::BLANK, Settings, &payload(1), Ok(()));
+    let (second, _) = store_block(&first, Settings, &payload(2), Ok(()));
+    for (at, wrong, found) in [(0, 0x07, true), (WORD, 0xff, true), (HEADER, 0xff, true), (0, 0x0f, false)] {
+        for (flash, page) in [(&first, 2), (&second, 3)] {
+            let mut damaged = flash.clone();
+            damaged.pages[page][at] ^= wrong;
+            assert_eq!(is_damaged(&damaged, Settings), found, "{wrong:#x} at {at} of page {page}");
+        }
+    }
+}
+
+/// A transfer is cut off at each of its steps: until the new settings are valid, the next start finds the damage.
+#[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
+fn a_transfer_that_is_cut_off_hides_no_damage() {
+    let new = payload(9);
+    for stored in 1..=3 {
+        let mut flash =
+            (1..=stored).fold(Flash::BLANK, |flash, of| store_block(&flash, Settings, &payload(of), Ok(())).0);
+        let side = if stored % 2 == 1 { Side::A } else { Side::B };
+        flash.pages[Page { block: Settings, side }.index()][HEADER] ^= 1;
+        let steps = 1 + new.len().div_ceil(PART) * PART / WORD + 2;
+        for (cut, torn) in (1..=steps).flat_map(|cut| TORN.map(|torn| (cut, torn))) {
+            let until = Flash { steps: Some(cut), torn, ..flash.clone() };
+            let again = Flash { steps: None, ..store_block(&until, Settings, &new, Ok(())).0 };
+            let is_new = newest_block(&again, Settings).as_ref() == Some(&new);
+            assert!(is_new || is_damaged(&again, Settings), "of {stored}, step {cut}, {torn:?}");
+        }
+        let (after, _) = store_block(&flash, Settings, &new, Ok(()));
+        assert_eq!((newest_block(&after, Settings).as_ref(), is_damaged(&after, Settings)), (Some(&new), false));
     }
 }
 
@@ -242,6 +274,7 @@ fn a_page_of_one_block_is_none_of_the_other() {
     let [a, _, c, _] = &mut flash.pages;
     a.copy_from_slice(c);
     assert_eq!((newest_block(&flash, Model), newest_block(&flash, Settings)), (None, Some(payload(1))));
+    assert!(!is_damaged(&flash, Model), "nor a damaged one");
 }
 
 #[test]
