@@ -82,6 +82,8 @@ pub struct Control {
     spring: Spring,
     scale: Scale,
     supervisor: Supervisor,
+    /// Faults whose causes the start has found; they are there until the next start.
+    causes: Faults,
     target: Volts,
     ticks_since_host: u32,
 }
@@ -114,7 +116,8 @@ impl Control {
         let supervision = supervision.validate(settings.sample_time())?;
         let supervisor = Supervisor::new(supervision.quantize(), last_fault);
         let spring = Spring::Plain(Loop::new(settings));
-        Ok(Self { spring, scale: Default::default(), supervisor, target: Volts::ZERO, ticks_since_host: u32::MAX })
+        let (causes, target) = (Faults::NONE, Volts::ZERO);
+        Ok(Self { spring, scale: Default::default(), supervisor, causes, target, ticks_since_host: u32::MAX })
     }
 
     /// Replaces the spring of `settings` by the identified `model`, and the amplifier's limits by its own where those are
@@ -142,6 +145,13 @@ impl Control {
     /// Enters the faulted state with `fault`. Call it before the first tick.
     pub fn fault(&mut self, fault: Fault) {
         self.supervisor.fail(fault);
+    }
+
+    /// Enters the faulted state with `fault`, whose cause is there until the next start: it cannot be acknowledged. Call it
+    /// before the first tick.
+    pub fn cause(&mut self, fault: Fault) {
+        self.causes = self.causes.with(fault);
+        self.fault(fault);
     }
 
     /// The supervisor, for the log and the replies to the host.
@@ -186,7 +196,7 @@ impl Control {
             interlock_closed: sensors.interlock_closed,
             missed_ticks: sensors.missed_ticks,
             monitors: sensors.monitors,
-            faults: sensors.faults,
+            faults: self.causes.and(sensors.faults),
         });
         let target = match decision {
             Decision::Rest => Volts::ZERO,

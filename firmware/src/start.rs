@@ -1,8 +1,9 @@
 //! Settings, model and fault of the last run at the start, and the controller that is built from them.
 //!
 //! Stored settings run from the start on, or not at all: those of another format, out of range or beyond what the image
-//! contains are a `config` fault, and the built-in ones run. A damaged page of settings or model is a `config` fault as well, and
-//! the content before it runs, or the built-in one. An erased page is none.
+//! contains are a `config` fault, and so is a damaged page of settings or model. Its cause is there until a start finds others:
+//! what the program runs instead, the content before or the built-in one, may have a larger range, and never drives the output. An
+//! erased page is none.
 
 use link::{Block, BlockId, Blocks, Field, Reason, WireModel, WireSettings};
 use model::supervisor::Fault;
@@ -96,8 +97,10 @@ pub fn control<'a>(
         start.rejected = start.rejected.or(Some(error.field));
     }
     // Every one of them has to be acknowledged; the state shows the first.
-    let rejected = start.rejected.or(loaded.rejected).map(|_| Fault::Config);
-    for fault in rejected.into_iter().chain(cause.fault).chain(cause.standing.iter()) {
+    if start.rejected.or(loaded.rejected).is_some() {
+        control.cause(Fault::Config);
+    }
+    for fault in cause.fault.into_iter().chain(cause.standing.iter()) {
         control.fault(fault);
     }
     Ok((control, start))
@@ -181,13 +184,14 @@ fn build<'a>(settings: &device::Settings, place: &'a mut Option<Control>) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::{Sensors, Untimed};
     use crate::settings::BUILT_IN;
     use crate::settings::{SETTINGS, built_in};
     use crate::store::{Memory, Page, Side, WORD};
     use link::wire_model::FORMAT;
-    use link::{Controller, Field, frame, wire_settings};
+    use link::{Command, Controller, Field, frame, wire_settings};
     use model::isolation::Causes;
-    use model::supervisor::{Faults, State};
+    use model::supervisor::{self, Faults, Refusal, State};
     use model::{adaptation, isolation};
     use std::vec::Vec;
 
@@ -204,6 +208,17 @@ mod tests {
             store.end(*block, payload.len() as u16, frame::checksum(payload), |_, _| Ok(())).unwrap();
         }
         store
+    }
+
+    /// Whether `fault` stays, although the host acknowledges and arms.
+    fn stays(control: &mut Control, fault: Fault) -> bool {
+        let sensors = Sensors { interlock_closed: true, ..Sensors::default() };
+        for arming in [supervisor::Command::Disarm, supervisor::Command::Arm, supervisor::Command::Disarm] {
+            let command = Command { heard: true, arming: Some(arming), target: None };
+            control.tick(&command, &sensors, &mut Untimed);
+        }
+        let supervisor = control.supervisor();
+        (supervisor.state(), supervisor.refusal()) == (State::Faulted(fault), Some(Refusal::CausePresent))
     }
 
     fn built_in_settings() -> WireSettings {
@@ -225,7 +240,9 @@ mod tests {
             let (control, start) = control(&PAPER, stored, &cause, &mut place).unwrap();
             let stands = start.rejected.map_or(standing, |_| standing.with(Fault::Config));
             assert_eq!(control.supervisor().standing(), stands);
-            (control.supervisor().state(), start)
+            let state = control.supervisor().state();
+            assert_eq!(stays(control, Fault::Config), start.rejected.is_some(), "until a start finds another model");
+            (state, start)
         };
         let (valid, invalid) = (model(0.1).payload().unwrap(), model(2.0).payload().unwrap());
         let (faulted, built_in_v) = (State::Faulted, BUILT_IN.control.amplifier.max_v);
@@ -284,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn rejected_settings_are_a_config_fault_and_the_built_in_ones_run() {
+    fn rejected_settings_are_a_config_fault_that_no_acknowledgement_ends() {
         let wire = built_in_settings();
         let good = wire.payload().unwrap();
         let newer = [&[wire_settings::FORMAT + 1], &good[1..]].concat();
@@ -308,6 +325,7 @@ mod tests {
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
             let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
             assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config), "{rejected}");
+            assert!(stays(control, Fault::Config), "{rejected}");
         }
     }
 
@@ -330,6 +348,7 @@ mod tests {
             let cause = Cause { name: "power-on", fault: None, standing: Faults::NONE };
             let (control, _) = control(&loaded, None, &cause, &mut place).unwrap();
             assert_eq!(control.supervisor().state(), State::Faulted(Fault::Config), "{what}");
+            assert!(stays(control, Fault::Config), "{what}");
             assert_eq!(load(&store(&[(block, payload)]), &BUILT_IN).rejected, None);
         }
         assert_eq!(load(&store(&[]), &BUILT_IN).rejected, None, "a board to which nothing was ever sent");

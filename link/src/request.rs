@@ -37,21 +37,22 @@ pub enum Request {
     },
     /// Reads the identities of the running and of the stored model.
     Model,
-    /// Sends a part of a model's payload; part 0 starts a new transfer. Rejected out of order and unless disarmed.
+    /// Sends a part of a model's payload; part 0 starts a new transfer. Rejected out of order, while armed, and while
+    /// faulted unless a `config` fault stands.
     ModelPart {
         /// Number of the part, counted from 0.
         number: u8,
         /// Content; the last part is padded with zeros.
         bytes: [u8; PART],
     },
-    /// Ends the transfer: the model is validated and stored, and runs from the next start on. Rejected unless disarmed.
+    /// Ends the transfer: the model is validated and stored, and runs from the next start on. Rejected as a part is.
     ModelEnd {
         /// Length of the payload, in bytes.
         length: u16,
         /// CRC-32C of the payload.
         checksum: u32,
     },
-    /// Restarts the MCU with the stored model and settings. Rejected unless disarmed.
+    /// Restarts the MCU with the stored model and settings. Rejected as a part of a model is.
     Restart,
     /// Informs the MCU that the report of a fault with this number has arrived, so that it is not repeated. It acknowledges
     /// no fault.

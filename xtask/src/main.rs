@@ -90,8 +90,8 @@ enum Command {
     Story(Forwarded),
     /// Write the image to the real board and show its log (probe-rs)
     ///
-    /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; a model
-    /// that the controller cannot run is a fault until it is acknowledged. Needs `cargo install probe-rs-tools --locked`, and
+    /// The log's first line names the controller, a second one an amplifier of 1000 V. A stored model stays; one
+    /// that the controller cannot run is a fault until another is sent. Needs `cargo install probe-rs-tools --locked`, and
     /// on Linux the udev rules of https://probe.rs/docs/getting-started/probe-setup/
     #[command(
         verbatim_doc_comment,

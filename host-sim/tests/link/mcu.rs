@@ -285,7 +285,6 @@ impl Chip {
     fn new(setup: Setup, shared: Arc<Mutex<Shared>>) -> Self {
         let store = Store::new(shared.lock().unwrap().flash.clone());
         let mut loaded = start::load(&store, &BUILT_IN);
-        assert_eq!(loaded.rejected, None);
         loaded.settings.control.amplifier.dac_bits = setup.dac_bits;
         let settings = loaded.settings;
         loaded.settings.supervision.host_timeout_s = f64::from(setup.silence_ms) / 1000.0;

@@ -1,6 +1,7 @@
 //! Settings for the MCU.
 
-use link::State;
+use firmware::store::{Page, Pages, Side, WORD};
+use link::{Block, State};
 use serde_json::Value;
 
 use crate::mcu::{Mcu, Setup};
@@ -56,6 +57,36 @@ fn settings_are_sent_checked_stored_and_run() {
     );
     let ordered = mcu.with(|shared| shared.ordered.len());
     assert_eq!(ordered, 3, "nothing but arming, one target and disarming reached the tick");
+}
+
+/// The range of the built-in settings, which the program falls back to, is the larger one.
+#[test]
+fn settings_that_are_damaged_raise_no_limit_and_others_are_taken_meanwhile() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let port = &mcu.port;
+    let small = file(&folder, "small.toml", "schema = 1\n[amplifier]\nmax_v = 400\n");
+    good(port, &["settings", &small]);
+    mcu.with(|shared| {
+        let page = Page { block: Block::Settings, side: Side::A };
+        let mut word = *shared.flash.bytes(page)[2 * WORD..].first_chunk().unwrap();
+        word[0] ^= 1;
+        shared.flash.program(page, 2 * WORD, word).unwrap();
+        shared.restart = true;
+    });
+    mcu.wait_for(State::Faulted);
+    assert_eq!(json(port, &["status"])["highest_v"], 700.0);
+    for (command, refused) in
+        [("acknowledge", "the cause of the fault is still there: config (7)"), ("arm", "faulted: config (7)")]
+    {
+        let arguments: &[&str] = if command == "arm" { &["arm"] } else { &["acknowledge", "config"] };
+        let text = bad(1, port, arguments);
+        assert!(text.contains(refused), "{text}");
+    }
+    good(port, &["settings", &small]);
+    assert_eq!(json(port, &["status"])["highest_v"], 400.0);
+    good(port, &["set", "390", "--arm", "--keep", "0.1"]);
+    bad(2, port, &["set", "401"]);
 }
 
 #[test]

@@ -144,7 +144,8 @@ impl Server {
                 | Request::SettingsPart { .. }
                 | Request::SettingsEnd { .. }
                 | Request::Restart
-                    if view.state != supervisor::State::Disarmed =>
+                    if view.state != supervisor::State::Disarmed
+                        && !view.standing.contains(supervisor::Fault::Config) =>
                 {
                     Reply::Refused(match Fault::of(view.state) {
                         Fault::NONE => Reason::Armed,

@@ -176,7 +176,7 @@ fn requests_without_a_command_are_answered_without_a_tick() {
 }
 
 #[test]
-fn models_and_settings_are_accepted_only_while_disarmed() {
+fn models_and_settings_are_accepted_while_disarmed_and_while_a_config_fault_stands() {
     let monitor = Fault::from(Cause::Monitor);
     for request in [
         Request::ModelPart { number: 0, bytes: [1; PART] },
@@ -189,6 +189,8 @@ fn models_and_settings_are_accepted_only_while_disarmed() {
         assert_eq!(answer(DISARMED), Reply::Ack { state: State::Disarmed, target: WireVolts(7) }, "{request:?}");
         assert_eq!(answer(ARMED), Reply::Refused(Reason::Armed), "{request:?}");
         assert_eq!(answer(FAULTED), Reply::Refused(Reason::Faulted(monitor)), "{request:?}");
+        let done = Reply::Ack { state: State::Faulted, target: WireVolts(7) };
+        assert_eq!(answer(View { standing: FAULTED.standing.with(Cause::Config), ..FAULTED }), done, "{request:?}");
     }
     let models = Blocks { active: BlockId::default(), stored: REJECTED };
     assert_eq!(exchange(Request::Model, &ARMED, &ARMED).1, Reply::Model(models));

@@ -126,6 +126,11 @@ impl Faults {
         Self(self.0 | Self::bit(fault))
     }
 
+    /// Returns the faults of both sets.
+    pub const fn and(self, others: Self) -> Self {
+        Self(self.0 | others.0)
+    }
+
     /// Returns the set without `fault`.
     pub const fn without(self, fault: Fault) -> Self {
         Self(self.0 & !Self::bit(fault))
@@ -168,6 +173,7 @@ mod tests {
         assert_eq!(both.bits(), 0x81);
         assert_eq!(Faults::from_bits(0xfc81), both, "bits without a fault are dropped");
         assert_eq!(both.without(Fault::Panic).without(Fault::Panic), Faults::from_bits(0x80));
+        assert_eq!(Faults::from_bits(1).and(Faults::from_bits(0x80)), both);
         assert_eq!(both.except(Faults::NONE.with(Fault::Supply)), Faults::from_bits(1));
         assert!(both.contains(Fault::Supply) && !both.contains(Fault::Interlock));
         assert_eq!(Fault::ALL.into_iter().collect::<Faults>().iter().count(), Fault::ALL.len());
