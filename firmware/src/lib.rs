@@ -11,6 +11,7 @@
 //! | --- | --- |
 //! | [`board`] | Traits that a board implements. |
 //! | [`control`] | One control tick: supervisor, model, supervisor. |
+//! | [`fault_lines`] | Faults whose lines of the log are not queued yet. |
 //! | [`isolation`] | Fault isolation after each control tick. |
 //! | [`mailbox`] | Hand-over of commands to the control tick; drops commands that a fault has made obsolete. |
 //! | [`capture`] | The fast capture: every tick in a row of RAM. |
@@ -50,6 +51,7 @@ pub mod board;
 pub mod capture;
 pub mod clock_test;
 pub mod control;
+pub mod fault_lines;
 pub mod isolation;
 pub mod mailbox;
 pub mod pace;

@@ -71,9 +71,14 @@ static DROPPED: AtomicU32 = AtomicU32::new(0);
 /// Number of ticks in a second, from [`boot`] on.
 static RATE_HZ: AtomicU32 = AtomicU32::new(0);
 
+/// Queues an event. Returns false if the queue is full.
+pub fn try_queue(event: Event) -> bool {
+    EVENTS.try_send(event).is_ok()
+}
+
 /// Queues an event. If the queue is full, the event is dropped and counted.
 pub fn queue(event: Event) {
-    if EVENTS.try_send(event).is_err() {
+    if !try_queue(event) {
         DROPPED.fetch_add(1, Ordering::Relaxed);
     }
 }

@@ -8,8 +8,9 @@ use model::{Limits, Sensor, Volts, device};
 
 use crate::board::{Amplifier, Board};
 use crate::control::{Control, Sensors, Source, Stopwatch, Tick};
+use crate::fault_lines::FaultLines;
 use crate::isolation::Isolation;
-use crate::log::{self, EVENTS, Event, Summary, queue};
+use crate::log::{self, EVENTS, Event, Summary, queue, try_queue};
 use crate::pace::Pace;
 use crate::task_watchdog::{TASK_WATCHDOG, Task};
 use crate::{adaptation, crash_record, hang_guard, stop};
@@ -109,6 +110,7 @@ struct Report {
     rate_hz: u32,
     state: &'static str,
     standing: Faults,
+    unlogged: FaultLines,
     limits: Limits,
     sensor: Option<Sensor>,
     overruns: u32,
@@ -137,14 +139,16 @@ impl Report {
                 State::Disarmed | State::Armed => None,
             };
             crash_record::set(shown, standing);
-            for fault in standing.except(self.standing).iter() {
-                queue(Event::Fault(fault, number));
-                if let (Fault::Monitor, Some(mismatch)) = (fault, supervisor.mismatch()) {
-                    queue(Event::Mismatch(mismatch, number));
-                }
-            }
+            self.unlogged.add(standing.except(self.standing), number);
             self.standing = standing;
         }
+        self.unlogged.pass(|fault, tick| {
+            let is_queued = try_queue(Event::Fault(fault, tick));
+            if let (true, Fault::Monitor, Some(mismatch)) = (is_queued, fault, supervisor.mismatch()) {
+                queue(Event::Mismatch(mismatch, tick));
+            }
+            is_queued
+        });
         let limits = supervisor.limits(&tick.output);
         if limits != self.limits {
             queue(Event::Limits(limits.bits(), number));
