@@ -56,6 +56,11 @@ def dip(board):
     board.cut = board.now, POWER_ON
 
 
+def pressed_armed(board):
+    """The reset button is pressed while armed."""
+    board.cut = board.now, BUTTON
+
+
 def pressed(board):
     """The reset button is pressed after a fault."""
     opened(board)
@@ -210,6 +215,7 @@ if __name__ == "__main__":
         "damaged settings": play(HOST, None, 400_000, before=faded),
         "dip": play(HOST, dip, 400_000),
         "button": play(HOST, pressed, 400_000),
+        "button while armed": play(HOST, pressed_armed, 400_000),
         "interlock": play(HOST, opened, 480_000),
         "no voltage": play(HOST, shorted, 480_000),
         "other amplifier": play(HOST, mistaken, 480_000) if FULL_SCALE < 1000 else None,

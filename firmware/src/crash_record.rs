@@ -9,7 +9,7 @@
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-use model::supervisor::{Fault, Faults};
+use model::supervisor::{Fault, Faults, State};
 
 use crate::reset_cause::{self, Cause, Record, Reset};
 
@@ -38,9 +38,9 @@ pub fn reset_cause(flags: Option<Reset>) -> Cause {
     cause.unwrap_or(Cause { name: "other", fault: None, standing: Faults::NONE })
 }
 
-/// Records the fault that is shown, and all that stand, for the next run.
-pub fn set(shown: Option<Fault>, standing: Faults) {
-    change(|_| shown.map_or(Record::RUNNING, |fault| Record::faulted(fault, standing)));
+/// Records the state, and all faults that stand, for the next run.
+pub fn set(state: State, standing: Faults) {
+    change(|_| Record::of(state, standing));
 }
 
 /// Adds the fault that stops the program.

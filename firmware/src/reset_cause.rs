@@ -3,12 +3,14 @@
 //! The crash record survives every reset except a loss of its RAM's supply. After a short dip of the supply the program finds
 //! the record of the previous run; after power-on it finds none.
 
-use model::supervisor::{Fault, Faults};
+use model::supervisor::{Fault, Faults, State};
 
 /// "vsj2"
 const MARK: u32 = 0x7673_6a32;
 /// Code of [`CrashRecord::Running`].
 const RUNNING: u32 = 0;
+/// Code of [`CrashRecord::Armed`].
+const ARMED: u32 = u32::MAX - 1;
 /// Code of [`CrashRecord::Restart`].
 const RESTART: u32 = u32::MAX;
 
@@ -19,6 +21,8 @@ pub enum CrashRecord {
     None,
     /// The program was running without a fault until a reset that it did not cause.
     Running,
+    /// The same, with its output enabled.
+    Armed,
     /// The host had requested a restart.
     Restart,
     /// The fault that the previous run showed or that stopped it, and all that stood at its end, this one among them.
@@ -39,6 +43,15 @@ pub struct Record {
 impl Record {
     /// The record of a running program without a fault.
     pub const RUNNING: Self = Self::new(RUNNING, Faults::NONE);
+
+    /// The record of a program in `state`, while the faults `standing` stand.
+    pub const fn of(state: State, standing: Faults) -> Self {
+        match state {
+            State::Disarmed => Self::RUNNING,
+            State::Armed => Self::new(ARMED, Faults::NONE),
+            State::Faulted(fault) => Self::faulted(fault, standing),
+        }
+    }
 
     /// The record of a program that shows `fault` while the faults `standing` stand.
     pub const fn faulted(fault: Fault, standing: Faults) -> Self {
@@ -70,6 +83,7 @@ impl Record {
         match u8::try_from(code).ok().and_then(Fault::from_code) {
             Some(fault) => CrashRecord::Faulted(fault, Faults::from_bits(standing as u16).with(fault)),
             None if code == RESTART => CrashRecord::Restart,
+            None if code == ARMED => CrashRecord::Armed,
             None => CrashRecord::Running,
         }
     }
@@ -114,11 +128,11 @@ pub struct Cause {
 pub fn reset_cause(reset: Option<Reset>, record: CrashRecord) -> Cause {
     let (recorded, stood) = match record {
         CrashRecord::Faulted(fault, standing) => (Some(fault), standing),
-        CrashRecord::None | CrashRecord::Running | CrashRecord::Restart => (None, Faults::NONE),
+        CrashRecord::None | CrashRecord::Running | CrashRecord::Armed | CrashRecord::Restart => (None, Faults::NONE),
     };
     let derived = match record {
         CrashRecord::None => Reset::Supply,
-        CrashRecord::Running | CrashRecord::Faulted(Fault::Watchdog, _) => Reset::Watchdog,
+        CrashRecord::Running | CrashRecord::Armed | CrashRecord::Faulted(Fault::Watchdog, _) => Reset::Watchdog,
         CrashRecord::Restart | CrashRecord::Faulted(..) => Reset::Software,
     };
     let (name, of_reset) = match (reset.unwrap_or(derived), record) {
@@ -126,6 +140,9 @@ pub fn reset_cause(reset: Option<Reset>, record: CrashRecord) -> Cause {
         (Reset::Supply, _) => ("brown-out", Some(Fault::Supply)),
         (Reset::Watchdog, _) => ("watchdog", Some(Fault::Watchdog)),
         (Reset::Software, _) => ("software", None),
+        // As after a dip of the supply, the spring may be charged, which the estimator does not know.
+        (Reset::Pin, CrashRecord::Armed) => ("pin", Some(Fault::Supply)),
+        (Reset::Other, CrashRecord::Armed) => ("other", Some(Fault::Supply)),
         (Reset::Pin, _) => ("pin", None),
         (Reset::Other, _) => ("other", None),
     };

@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use embassy_time::{Duration, Instant, Timer, with_timeout};
-use model::supervisor::{Fault, Faults, State};
+use model::supervisor::{Fault, Faults};
 use model::{Limits, Sensor, Volts, device};
 
 use crate::board::{Amplifier, Board};
@@ -127,18 +127,15 @@ impl Report {
 
     fn tick(&mut self, number: u32, control: &Control, tick: &Tick) {
         let supervisor = control.supervisor();
-        let state = link::State::from(supervisor).name();
+        let (state, standing) = (link::State::from(supervisor).name(), supervisor.standing());
+        if state != self.state || standing != self.standing {
+            crash_record::set(supervisor.state(), standing);
+        }
         if state != self.state {
             queue(Event::State(self.state, state));
             self.state = state;
         }
-        let standing = supervisor.standing();
         if standing != self.standing {
-            let shown = match supervisor.state() {
-                State::Faulted(fault) => Some(fault),
-                State::Disarmed | State::Armed => None,
-            };
-            crash_record::set(shown, standing);
             self.unlogged.add(standing.except(self.standing), number);
             self.standing = standing;
         }

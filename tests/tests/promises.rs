@@ -186,7 +186,7 @@ fn drill(fault: Fault) -> &'static str {
         Fault::Watchdog => "drill `hang`, drill `deaf`, drill `stall`, boot `hang`, boot `deaf`",
         Fault::Monitor => "boot `no voltage`, boot `current`, boot `supply of 3.6 V`",
         Fault::Config => "drill `unguarded`, boot `unguarded`, boot `damaged settings`",
-        Fault::Supply => "boot `dip`",
+        Fault::Supply => "boot `dip`, boot `button while armed`",
         Fault::SelfTest => "boot `stuck bit`, boot `coupled bits`, boot `slow processor`",
         Fault::Isolation => {
             "`tests/tests/firmware_isolation.rs::a_cause_of_trip_on_cause_is_a_fault_until_it_is_acknowledged_and_another_cause_is_not`"

@@ -106,7 +106,11 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     println!("torn store: {}", runs::torn(&events("torn")?, &bytes).context("torn")?);
     println!("stored settings: {}", runs::stored(&events("stored settings")?, &bytes).context("stored settings")?);
     println!("damaged settings: {}", runs::damaged(&events("damaged settings")?, &bytes).context("damaged settings")?);
-    for (name, cause) in [("dip", "reset=brown-out last_fault=8"), ("button", "reset=pin last_fault=4")] {
+    for (name, cause) in [
+        ("dip", "reset=brown-out last_fault=8"),
+        ("button", "reset=pin last_fault=4"),
+        ("button while armed", "reset=pin last_fault=8"),
+    ] {
         println!("{name}: {}", runs::cut(&events(name)?, &bytes, cause).context(name)?);
     }
     println!("hang with interrupts off: {}", runs::deaf(&events("deaf")?, &bytes).context("deaf")?);

@@ -13,7 +13,9 @@ fn a_fault_survives_every_reset_and_stands_beside_a_dip_of_the_supply_or_the_wat
         (Reset::Software, CrashRecord::Restart, "software", None),
         (Reset::Software, panic, "software", Some(Fault::Panic)),
         (Reset::Pin, CrashRecord::Running, "pin", None),
+        (Reset::Pin, CrashRecord::Armed, "pin", Some(Fault::Supply)),
         (Reset::Pin, panic, "pin", Some(Fault::Panic)),
+        (Reset::Other, CrashRecord::Armed, "other", Some(Fault::Supply)),
         (Reset::Other, panic, "other", Some(Fault::Panic)),
     ] {
         let stood = if record == panic { both } else { fault.map_or(Faults::NONE, |it| Faults::NONE.with(it)) };
@@ -32,6 +34,7 @@ fn without_reset_flags_the_crash_record_determines_the_cause() {
         (CrashRecord::None, "power-on", None),
         (CrashRecord::Restart, "software", None),
         (CrashRecord::Running, "watchdog", Some(Fault::Watchdog)),
+        (CrashRecord::Armed, "watchdog", Some(Fault::Watchdog)),
         (CrashRecord::Faulted(Fault::Watchdog, Faults::NONE), "watchdog", Some(Fault::Watchdog)),
         (CrashRecord::Faulted(Fault::Panic, Faults::NONE), "software", Some(Fault::Panic)),
     ] {
@@ -71,13 +74,17 @@ fn a_damaged_record_is_none() {
         assert_eq!(damaged.read(), CrashRecord::None, "{damaged:?}");
     }
     assert_eq!(Record::RUNNING.read(), CrashRecord::Running);
+    for (state, record) in [(State::Disarmed, CrashRecord::Running), (State::Armed, CrashRecord::Armed)] {
+        assert_eq!(Record::of(state, Faults::NONE).read(), record);
+    }
 }
 
 /// Bits of a RAM that lost its supply for a moment.
 #[test]
 fn a_record_with_one_wrong_bit_is_none() {
     let standing = Faults::NONE.with(Fault::Monitor).with(Fault::Panic);
-    for good in [Record::RUNNING, Record::RUNNING.with_restart(), Record::faulted(Fault::Interlock, standing)] {
+    let armed = Record::of(State::Armed, Faults::NONE);
+    for good in [Record::RUNNING, armed, armed.with_restart(), Record::faulted(Fault::Interlock, standing)] {
         assert_ne!(good.read(), CrashRecord::None);
         for bit in (0..32).map(|bit| 1 << bit) {
             for damaged in [

@@ -73,7 +73,9 @@ impl Fault {
             Self::Watchdog => "the hang guard, the task watchdog or the chip's watchdog",
             Self::Monitor => "the supervisor: voltage, current or the converters' supply disagree with the output",
             Self::Config => "the start: rejected or damaged settings or model, no guards",
-            Self::Supply => "the chip's brown-out reset, with RAM that has kept its content",
+            Self::Supply => {
+                "the chip's brown-out reset, or a reset from outside while armed, with RAM that has kept its content"
+            }
             Self::SelfTest => "the start: a word of the RAM, or the processor's clock compared with the watchdog's",
             Self::Isolation => "the isolation bank: it has named a cause of the setting trip_on_cause",
         }
