@@ -12,10 +12,15 @@ use crate::nightly;
 /// Cases of a property test under Miri.
 const CASES: &str = "4";
 
+/// Every part of the tick that an image may have.
+const FEATURES: &str = "firmware/fast,firmware/robust,firmware/adaptation";
+
 /// Packages with the code of the control tick and of the link; the integration tests of `model` are all long.
 /// Miri does not know the instructions with which libm computes a square root; in integers it gives the same bits.
-const INTERPRETED: &[&[&str]] =
-    &[&["-p", "vsj-link"], &["-p", "vsj-model", "-p", "firmware", "--lib", "--features", "libm/force-soft-floats"]];
+const INTERPRETED: &[&[&str]] = &[
+    &["-p", "vsj-link"],
+    &["-p", "vsj-model", "-p", "firmware", "--lib", "--features", FEATURES, "--features", "libm/force-soft-floats"],
+];
 
 /// Arguments of `cargo xtask sanitize`.
 #[derive(clap::Args)]
@@ -42,7 +47,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         nightly::install("rust-src")?;
         let host = host()?;
         let mut command = nightly::cargo();
-        command.args(["test", "-p", "vsj-model", "-p", "vsj-link", "-p", "firmware", "--tests", "--target", &host]);
+        command.args(["test", "-p", "vsj-model", "-p", "vsj-link", "-p", "firmware", "--tests"]);
+        command.args(["--features", FEATURES, "--target", &host]);
         command.env("RUSTFLAGS", "-Zsanitizer=address").env("CARGO_TARGET_DIR", target.join("sanitize"));
         shell::run(&mut command)?;
     }
