@@ -32,7 +32,6 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use xtask::setup;
-use xtask::variant::Variant;
 
 use binary::size;
 
@@ -125,8 +124,9 @@ Examples:
   cargo xtask boot
   cargo xtask boot --controller fast                   the image of the time-optimal controller
   cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V
-  cargo xtask boot --controller robust                 for a spring known to within errors")]
-    Boot(Variant),
+  cargo xtask boot --controller robust                 for a spring known to within errors
+  cargo xtask boot --all                               every image, one after the other")]
+    Boot(boot::Args),
     /// Build the C library's example, run it here and under QEMU
     ///
     /// As a user does: settings by `vsj export c`, the libraries by cargo, the example by CMake, for this machine and for a
@@ -155,7 +155,7 @@ fn main() -> ExitCode {
         Command::Clients => clients::run(),
         Command::Story(args) => story::run(&args),
         Command::Size(args) => size::run(&args),
-        Command::Boot(variant) => boot::run(variant),
+        Command::Boot(args) => boot::run(&args),
         Command::Capi => capi::run(),
         Command::Soak(args) => soak::run(&args),
     };

@@ -29,8 +29,23 @@ const CANNOT_SHOW: &str = "\
 not shown: real time (an instruction is one cycle here; no wait states, no conversion times), analogue behaviour (DAC, monitors,
   the amplifier's pull-down), silicon errata, a chip that differs from its manual";
 
+/// Arguments of `cargo xtask boot`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    variant: Variant,
+    /// Every image: each controller with each amplifier
+    #[arg(long, conflicts_with_all = ["controller", "limit_v"])]
+    all: bool,
+}
+
+/// Runs the image of a variant, or those of all.
+pub(crate) fn run(args: &Args) -> Result<()> {
+    if args.all { Variant::ALL.into_iter().try_for_each(one) } else { one(args.variant) }
+}
+
 /// Builds the image, runs it once for each case, and prints what each run showed.
-pub(crate) fn run(variant: Variant) -> Result<()> {
+fn one(variant: Variant) -> Result<()> {
     let Settings { amplifier, .. } = variant::settings(variant);
     println!(
         "image of the {} controller, {} to {} V",
