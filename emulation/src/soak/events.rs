@@ -42,6 +42,8 @@ struct Phase {
     open: u16,
     fault: u16,
     monitor: u16,
+    /// The monitors are wrong in every tick, as with another amplifier.
+    wrong: bool,
     reading: Readings,
 }
 
@@ -107,7 +109,7 @@ impl Events {
             heard,
             late_us: if happens(first, 3, phase.late) { self.lateness() } else { 0 },
             interlock_closed: !happens(second, 1, phase.open),
-            monitors: self.monitors(happens(second, 2, phase.monitor)),
+            monitors: self.monitors(phase.wrong || happens(second, 2, phase.monitor)),
             faults: if happens(second, 3, phase.fault) { self.faults() } else { Faults::NONE },
             measured: if self.sensor { self.reading(second as i32 >> 12) } else { None },
         }
@@ -135,6 +137,7 @@ impl Events {
             open,
             fault,
             monitor,
+            wrong: random.random_range(0..12) == 0,
             reading,
         }
     }

@@ -8,7 +8,7 @@ use firmware::settings::SUPERVISION;
 use link::Command;
 use model::SampleTime;
 use model::amplifier::Limits;
-use model::supervisor::{Drive, Faults, State, Supervisor};
+use model::supervisor::{Drive, Fault, Faults, State, Supervisor};
 
 use super::events::Event;
 use super::setup::SetLimits;
@@ -30,6 +30,8 @@ pub(super) struct Counts {
     missed: u64,
     silences: u64,
     trusted: u64,
+    /// Ticks with a new fault, in the order of [`Fault::ALL`].
+    codes: [u64; Fault::ALL.len()],
 }
 
 impl Counts {
@@ -46,18 +48,19 @@ impl Counts {
             missed: self.missed + other.missed,
             silences: self.silences + other.silences,
             trusted: self.trusted + other.trusted,
+            codes: std::array::from_fn(|at| self.codes[at] + other.codes[at]),
         }
     }
 
     /// The counts with their names, for `cargo xtask counts`.
     pub(super) fn tallied(&self) -> impl Iterator<Item = (String, u64)> {
         let runs = [("runs, each with settings of its own".to_owned(), self.runs)];
-        let ticks = self.named().map(|(name, count)| (format!("ticks: {name}"), count));
+        let ticks = self.named().into_iter().map(|(name, count)| (format!("ticks: {name}"), count));
         runs.into_iter().chain(ticks)
     }
 
-    fn named(&self) -> [(&'static str, u64); 10] {
-        [
+    fn named(&self) -> Vec<(String, u64)> {
+        let counts = [
             ("ran", self.ticks),
             ("with voltage", self.armed),
             ("at an end of the range", self.range),
@@ -68,11 +71,16 @@ impl Counts {
             ("came after missed ones", self.missed),
             ("disarmed after the host's silence", self.silences),
             ("corrected by a trusted sensor", self.trusted),
-        ]
+        ];
+        let codes = Fault::ALL
+            .iter()
+            .zip(self.codes)
+            .map(|(fault, count)| (format!("brought the fault {}", fault.name()), count));
+        counts.into_iter().map(|(name, count)| (name.to_owned(), count)).chain(codes).collect()
     }
 
     /// What no tick has shown, if anything.
-    pub(super) fn missing(&self) -> Option<&'static str> {
+    pub(super) fn missing(&self) -> Option<String> {
         self.named().into_iter().find(|(_, count)| *count == 0).map(|(name, _)| name)
     }
 }
@@ -92,7 +100,14 @@ pub(super) struct Watch {
     step_v: f64,
     /// Ticks without a frame of the host after which the output is disabled at the latest.
     longest_silence: u32,
+    host_timeout: u32,
     silent: u32,
+    /// Ticks for which the monitors may disagree with a voltage, and those for which they have now, without one that agreed.
+    longest_disagreement: u32,
+    disagreed: u32,
+    /// What was put out in the last tick; `None` while the output was disabled.
+    driven_v: Option<f64>,
+    standing: Faults,
     voltage_v: f64,
     overruns: u64,
 }
@@ -107,12 +122,18 @@ impl Watch {
         let sample_time = SampleTime::from_rate(limits.rate_hz).expect("the settings were accepted");
         // The target of a silent host ramps down from where it is within the range.
         let ramp = limits.amplifier.max_v / SUPERVISION.ramp_v_per_s / sample_time.seconds();
+        let host_timeout = SUPERVISION.host_timeout_ticks(sample_time);
         Self {
             limits,
             counts: Counts { runs: 1, ..Counts::default() },
             step_v: limits.amplifier.slew_v_per_s.map_or(f64::INFINITY, |slew| slew * sample_time.seconds()),
-            longest_silence: SUPERVISION.host_timeout_ticks(sample_time) + ramp as u32 + 3,
+            host_timeout,
+            longest_silence: host_timeout + ramp as u32 + 3,
             silent: u32::MAX,
+            longest_disagreement: (SUPERVISION.monitor_time_s / sample_time.seconds()).ceil() as u32,
+            disagreed: 0,
+            driven_v: None,
+            standing: Faults::NONE,
             voltage_v: 0.0,
             overruns: 0,
         }
@@ -149,13 +170,17 @@ impl Watch {
         ensure(armed || *drive == Drive::SAFE, || format!("{drive:?} in {state:?}"))?;
         ensure(!armed || sensors.interlock_closed, || "armed with an open interlock".into())?;
         ensure(!armed || sensors.faults == Faults::NONE, || format!("armed with {:?}", sensors.faults))?;
+        self.disagreed = if self.disagrees(sensors) { self.disagreed.saturating_add(1) } else { 0 };
+        ensure(!armed || self.disagreed <= self.longest_disagreement, || {
+            format!("armed after {} ticks with wrong monitors", self.disagreed)
+        })?;
         ensure(!armed || self.silent <= self.longest_silence, || format!("armed after {} silent ticks", self.silent))?;
         match state {
-            State::Faulted(shown) => {
-                ensure(standing != standing.without(shown), || format!("{shown:?} does not stand"))
-            }
+            State::Faulted(shown) => ensure(standing.contains(shown), || format!("{shown:?} does not stand")),
             _ => ensure(standing == Faults::NONE, || format!("{standing:?} in {state:?}")),
         }?;
+        let gone = self.standing.except(standing);
+        ensure(gone.except(sensors.faults) == gone, || format!("{gone:?} gone while its cause is there"))?;
         match (before, state) {
             (State::Faulted(_), State::Armed) => Err("armed from a fault".into()),
             (State::Disarmed, State::Armed) => {
@@ -174,9 +199,22 @@ impl Watch {
             ensure(output.applied.to_f64() == 0.0, || "a voltage at rest".into())
         }?;
         self.voltage_v = output.voltage.to_f64();
+        if self.driven_v.is_some() != armed {
+            self.disagreed = 0;
+        }
+        self.driven_v = armed.then_some(output.applied.to_f64());
         self.estimate(tick)?;
-        self.count(before, state, tick);
+        self.count(before, state, standing, tick);
+        self.standing = standing;
         Ok(())
+    }
+
+    /// Whether the monitors disagree with what was put out while the output was enabled.
+    fn disagrees(&self, sensors: &Sensors) -> bool {
+        let (Some(driven_v), Some(monitors)) = (self.driven_v, sensors.monitors) else { return false };
+        let far = (monitors.voltage.to_f64() - driven_v).abs() > SUPERVISION.monitor_tolerance_v;
+        let current = f64::from(monitors.current_ua).abs() > 1e6 * SUPERVISION.max_current_a;
+        far || current || monitors.supply_mv.is_some_and(|supply| !(3135..=3465).contains(&supply))
     }
 
     /// Range, slew and code of a tick with voltage.
@@ -210,7 +248,7 @@ impl Watch {
         ensure(inside, || format!("an estimate of {stiffness_v} V"))
     }
 
-    fn count(&mut self, before: State, state: State, tick: &Tick) {
+    fn count(&mut self, before: State, state: State, standing: Faults, tick: &Tick) {
         let counts = &mut self.counts;
         let limits = tick.output.limits;
         let faulted = |state| matches!(state, State::Faulted(_));
@@ -221,7 +259,11 @@ impl Watch {
         counts.armings += u64::from(before != State::Armed && state == State::Armed);
         counts.faults += u64::from(!faulted(before) && faulted(state));
         counts.acknowledged += u64::from(faulted(before) && before != state);
-        counts.silences += u64::from(before == State::Armed && state == State::Disarmed && self.silent > 500);
+        counts.silences +=
+            u64::from(before == State::Armed && state == State::Disarmed && self.silent > self.host_timeout);
+        for (count, fault) in counts.codes.iter_mut().zip(Fault::ALL) {
+            *count += u64::from(standing.except(self.standing).contains(fault));
+        }
         counts.trusted += u64::from(tick.output.sensor == Some(model::Sensor::Trusted));
     }
 }

@@ -99,10 +99,11 @@ fn one_run(run: u64, ticks: u64) -> Result<Counts> {
 mod tests {
     use super::*;
 
-    /// The share of every test run: one run with each kind of controller.
+    /// The share of every test run: one run with each kind of spring, sensor and controller.
     #[test]
     fn every_invariant_holds_in_random_ticks() {
-        let counts = (0..8).map(|run| one_run(run, 100_000).unwrap()).fold(Counts::default(), |sum, one| sum.and(&one));
+        let counts =
+            (0..12).map(|run| one_run(run, 100_000).unwrap()).fold(Counts::default(), |sum, one| sum.and(&one));
         assert_eq!(counts.missing(), None, "{counts}");
     }
 

@@ -1,11 +1,11 @@
-//! Random settings that the controller accepts: plain and extended springs, both controllers, with and without slew and
-//! sensor.
+//! Random settings that the controller accepts: plain and extended springs, the three controllers, with and without slew
+//! and sensor.
 
 use firmware::control::Control;
 use firmware::settings::SUPERVISION;
 use link::WireModel;
 use link::wire_model::WireMemory;
-use model::{Amplifier, Approach, Compensation, Feedback, Gains, Plant, Settings};
+use model::{Amplifier, Approach, Compensation, Feedback, Gains, Margin, Plant, Settings};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -28,9 +28,9 @@ pub(super) struct SetLimits {
 impl Setup {
     /// Random settings; the number of the run chooses the kind of spring and controller.
     pub(super) fn random(run: u64, random: &mut ChaCha8Rng) -> Self {
-        let [extended, optimal, sensor] = [1, 2, 4].map(|bit| run & bit != 0);
+        let [extended, sensor] = [1, 2].map(|bit| run & bit != 0);
         loop {
-            let settings = settings(optimal, sensor, random);
+            let settings = settings(run / 4 % 3, sensor, random);
             let Ok(mut control) = Control::new(&settings, &SUPERVISION, None) else { continue };
             let mut amplifier = settings.amplifier;
             if extended {
@@ -51,7 +51,7 @@ fn decades(random: &mut ChaCha8Rng, from: f64, to: f64) -> f64 {
     from * (to / from).powf(random.random())
 }
 
-fn settings(optimal: bool, sensor: bool, random: &mut ChaCha8Rng) -> Settings {
+fn settings(controller: u64, sensor: bool, random: &mut ChaCha8Rng) -> Settings {
     let full_scale_v = random.random_range(50.0..=1000.0);
     let min_v = if random.random() { 0.0 } else { random.random_range(0.0..=full_scale_v - 10.0) };
     let amplifier = Amplifier {
@@ -61,9 +61,15 @@ fn settings(optimal: bool, sensor: bool, random: &mut ChaCha8Rng) -> Settings {
         slew_v_per_s: random.random::<bool>().then(|| decades(random, 1.0, 1e6)),
         dac_bits: random.random_range(8..=16),
     };
-    let compensation = match optimal {
-        true => Compensation::TimeOptimal(Approach { time_constant_s: random.random_range(0.0..=1.0) }),
-        false => Compensation::ProportionalIntegral(Gains {
+    let compensation = match controller {
+        0 => Compensation::TimeOptimal(Approach { time_constant_s: random.random_range(0.0..=1.0) }),
+        1 => Compensation::Robust(Margin {
+            time_constant: random.random_range(0.0..=0.25),
+            share: random.random_range(0.0..=0.25),
+            gain: random.random_range(0.0..=0.25),
+            overshoot: random.random_range(0.0..=0.2),
+        }),
+        _ => Compensation::ProportionalIntegral(Gains {
             proportional: decades(random, 1e-3, 100.0),
             integral_per_s: decades(random, 1e-4, 100.0),
         }),
@@ -74,7 +80,7 @@ fn settings(optimal: bool, sensor: bool, random: &mut ChaCha8Rng) -> Settings {
         fastest_s: random.random_range(0.0..=1.0),
         ..Feedback::TYPICAL
     });
-    let rate_hz = decades(random, 1000.0, 10_000.0);
+    let rate_hz = decades(random, 100.0, 10_000.0);
     let plant = Plant { share: random.random_range(0.0..=0.9), time_constant_s: decades(random, 0.05, 1e4) };
     Settings { rate_hz, plant, compensation, amplifier, feedback }
 }
