@@ -2,7 +2,7 @@
 //!
 //! The tick is a pure function of its inputs and its state, without clock, pins and log: host and MCU compute the same bits.
 
-use link::{Command, WireModel};
+use link::{Command, Telemetry, View, WireModel};
 use model::estimator::{Estimator, Model};
 use model::supervisor::{self, Decision, Drive, Fault, Faults, Inputs, Monitors, Supervisor};
 use model::{
@@ -38,6 +38,27 @@ pub struct Tick {
     pub output: Output,
     /// The sensor reading that the tick has used.
     pub measured: Option<Volts>,
+}
+
+impl Tick {
+    /// What the host sees of this tick, the one with this `number`, whose `supervisor` this is, after so many `overruns`.
+    pub fn view(&self, number: u64, supervisor: &Supervisor, overruns: u32) -> View {
+        let output = &self.output;
+        let sample = Telemetry {
+            tick: number,
+            state: supervisor.into(),
+            target: output.target.into(),
+            applied: output.applied.into(),
+            estimate: output.stiffness.into(),
+            measured: self.measured.map(Into::into),
+            code: self.drive.code().0,
+            limits: supervisor.limits(output).bits(),
+            mismatch: supervisor.mismatch().into(),
+            sensor: output.sensor.into(),
+        };
+        let (state, standing, refusal) = (supervisor.state(), supervisor.standing(), supervisor.refusal());
+        View { sample, state, standing, refusal, overruns }
+    }
 }
 
 /// Measures the duration of the model's tick.

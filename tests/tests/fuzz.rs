@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use end_to_end::fuzz::{TARGETS, run};
+use end_to_end::fuzz::{TARGETS, frames, run};
 use proptest::test_runner::{Config, TestRunner};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,6 +51,14 @@ fn damaged(files: &[Vec<u8>], file: &[u8], random: &mut impl Rng) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// Frames of an earlier version of the protocol would test nothing but that they are refused.
+#[test]
+fn the_corpus_of_frames_has_requests_replies_and_notices_of_this_version() {
+    let read = corpus("wire").into_iter().map(|file| frames::messages(&file));
+    let [requests, replies, notices] = read.fold([0; 3], |sum, read| std::array::from_fn(|at| sum[at] + read[at]));
+    assert!(requests > 10 && replies > 10 && notices > 0, "{requests} requests, {replies} replies, {notices} notices");
 }
 
 #[test]

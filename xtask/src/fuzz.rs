@@ -24,7 +24,7 @@ const INPUT_BYTES: u32 = 16_384;
 /// Options of `cargo xtask fuzz`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The formats: csv, mcap, parquet, schedule, plant, settings, log, elf, recording, wire; default: all of them
+    /// The formats: csv, mcap, parquet, schedule, plant, settings, log, elf, recording, wire, server, plan, columns; default: all of them
     #[arg(value_name = "TARGET")]
     targets: Vec<String>,
     /// Time for each format, in s

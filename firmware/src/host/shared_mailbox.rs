@@ -6,7 +6,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use link::capture::Capture;
-use link::{Command, Reply, Telemetry, View};
+use link::{Command, Reply, View};
 use model::supervisor::State;
 
 use crate::capture::Recorder;
@@ -71,22 +71,8 @@ impl Source for Host {
     fn done(&mut self, tick: &Tick, control: &Control, overruns: u32) {
         let supervisor = control.supervisor();
         self.state = supervisor.state();
-        let output = &tick.output;
-        let sample = Telemetry {
-            tick: self.tick,
-            state: supervisor.into(),
-            target: output.target.into(),
-            applied: output.applied.into(),
-            estimate: output.stiffness.into(),
-            measured: tick.measured.map(Into::into),
-            code: tick.drive.code().0,
-            limits: supervisor.limits(output).bits(),
-            mismatch: supervisor.mismatch().into(),
-            sensor: output.sensor.into(),
-        };
-        RECORDER.tick(capture_memory::words(), &sample, overruns);
-        let (state, standing) = (self.state, supervisor.standing());
-        let view = View { sample, state, standing, refusal: supervisor.refusal(), overruns };
+        let view = tick.view(self.tick, supervisor, overruns);
+        RECORDER.tick(capture_memory::words(), &view.sample, overruns);
         with_mailbox(|mailbox| mailbox.show(view));
         if self.took_command {
             DONE.signal(view);

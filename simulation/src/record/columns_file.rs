@@ -56,7 +56,11 @@ pub fn open(path: &Path) -> Result<(Format, Option<String>)> {
     parse(&name, &Source::open(path)?.utf_8()?)
 }
 
-fn parse(name: &str, text: &str) -> Result<(Format, Option<String>)> {
+/// Reads the text of a file that messages call `name`: as [`open`].
+///
+/// # Errors
+/// [`BadInput`] with file, line, column and what was expected.
+pub fn parse(name: &str, text: &str) -> Result<(Format, Option<String>)> {
     let File { columns, .. } = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
         let expected = "expected [columns] with time, voltage, reading, input, separator, decimal, sort";

@@ -1,16 +1,12 @@
 //! Frames on the serial link, and models of the spring and settings in them.
 
-use link::{Action, Frame, Message, Packet, Receiver, Reply, Request, Session, Unreadable, WireModel, WireSettings};
+use link::{
+    Action, Frame, Message, Notice, Packet, Receiver, Reply, Request, Session, Unreadable, WireModel, WireSettings,
+};
 
 /// Bytes on the line: what is read is the message that was sent, and a session survives everything.
 pub(super) fn wire(bytes: &[u8]) {
-    let mut receiver = Receiver::new();
-    for &byte in bytes {
-        if let Some(packet) = receiver.on_byte(byte) {
-            check_message::<Request>(&packet);
-            check_message::<Reply>(&packet);
-        }
-    }
+    messages(bytes);
     let mut session = Session::new(100, 7);
     for (now, &byte) in (0..).zip(bytes) {
         if let Some(Action::Apply(_)) = session.on_byte(byte, now) {
@@ -40,11 +36,28 @@ pub(super) fn wire(bytes: &[u8]) {
     }
 }
 
-/// A readable message is the same after it was sent once more.
-fn check_message<M: Message + std::fmt::Debug>(packet: &Packet<'_>) {
+/// The numbers of requests, replies and notices that are read, each the same after it was sent once more.
+///
+/// # Panics
+/// If a message is another one then.
+pub fn messages(bytes: &[u8]) -> [usize; 3] {
+    let mut receiver = Receiver::new();
+    let mut read = [0; 3];
+    for &byte in bytes {
+        if let Some(packet) = receiver.on_byte(byte) {
+            let is =
+                [check_message::<Request>(&packet), check_message::<Reply>(&packet), check_message::<Notice>(&packet)];
+            read.iter_mut().zip(is).for_each(|(count, is)| *count += usize::from(is));
+        }
+    }
+    read
+}
+
+/// Whether a message is read, which has to be the same after it was sent once more.
+fn check_message<M: Message + std::fmt::Debug>(packet: &Packet<'_>) -> bool {
     let message = match packet.read::<M>() {
         Ok(message) => message,
-        Err(Unreadable::Kind | Unreadable::Message | Unreadable::Version(_)) => return,
+        Err(Unreadable::Kind | Unreadable::Message | Unreadable::Version(_)) => return false,
     };
     let frame = Frame::new(packet.session().stamp(packet.sequence), &message);
     let mut receiver = Receiver::new();
@@ -56,4 +69,5 @@ fn check_message<M: Message + std::fmt::Debug>(packet: &Packet<'_>) {
         Some(format!("{message:?}")),
         "the message changes on the wire"
     );
+    true
 }

@@ -4,12 +4,14 @@
 //! In: bytes from a file, a port or a fuzzer. Out: nothing, or a panic that says which property is violated. That nothing
 //! else panics, overflows or is read out of bounds is a property of every call.
 
-mod frames;
+pub mod frames;
 mod logs;
 mod plants;
 mod recordings;
+mod servers;
 mod settings;
 mod tables;
+mod texts;
 
 /// A check of all properties of one format for some bytes.
 pub type Check = fn(&[u8]);
@@ -25,6 +27,9 @@ pub const TARGETS: &[(&str, Check)] = &[
     ("elf", logs::elf),
     ("recording", recordings::recording),
     ("wire", frames::wire),
+    ("server", servers::server),
+    ("plan", texts::plan),
+    ("columns", texts::columns),
     ("settings", settings::settings),
 ];
 
