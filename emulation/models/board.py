@@ -148,13 +148,14 @@ class Board:
         self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
 
     def watch(self, begin, end, what):
-        """Notes the first read from `begin` on, before `end`."""
+        """Notes the first read from `begin` on, before `end`. Unicorn takes an IT block with a hooked load for longer than it is and
+        skips what follows, so that the hook goes with that read."""
 
         def read(*_):
-            if not any(name == what for _, name, _ in self.log):
-                self.note(what, begin)
+            self.note(what, begin)
+            self.uc.hook_del(hook)
 
-        self.uc.hook_add(UC_HOOK_MEM_READ, read, begin=begin, end=end - 1)
+        hook = self.uc.hook_add(UC_HOOK_MEM_READ, read, begin=begin, end=end - 1)
 
     def stick(self, at, bit):
         """From now on a bit of the RAM's word at `at` reads as zero."""
