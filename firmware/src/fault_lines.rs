@@ -13,8 +13,8 @@ pub struct FaultLines {
 impl FaultLines {
     /// Takes the `faults` that have come in `tick`. One that still waits has its newest tick.
     pub fn add(&mut self, faults: Faults, tick: u32) {
-        for (fault, at) in Fault::ALL.into_iter().zip(&mut self.ticks) {
-            if faults.contains(fault) {
+        for (fault, at) in Fault::ALL.iter().zip(&mut self.ticks) {
+            if faults.contains(*fault) {
                 *at = tick;
             }
         }
@@ -26,12 +26,12 @@ impl FaultLines {
         if self.waiting == Faults::NONE {
             return;
         }
-        for (fault, tick) in Fault::ALL.into_iter().zip(self.ticks) {
-            if self.waiting.contains(fault) {
-                if !queue(fault, tick) {
+        for (fault, tick) in Fault::ALL.iter().zip(&self.ticks) {
+            if self.waiting.contains(*fault) {
+                if !queue(*fault, *tick) {
                     return;
                 }
-                self.waiting = self.waiting.without(fault);
+                self.waiting = self.waiting.without(*fault);
             }
         }
     }

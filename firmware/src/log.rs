@@ -71,7 +71,8 @@ static DROPPED: AtomicU32 = AtomicU32::new(0);
 /// Number of ticks in a second, from [`boot`] on.
 static RATE_HZ: AtomicU32 = AtomicU32::new(0);
 
-/// Queues an event. Returns false if the queue is full.
+/// Queues an event. Returns false if the queue is full. Not inlined: an event is large.
+#[inline(never)]
 pub fn try_queue(event: Event) -> bool {
     EVENTS.try_send(event).is_ok()
 }

@@ -46,11 +46,12 @@ impl Record {
 
     /// The record of a program in `state`, while the faults `standing` stand.
     pub const fn of(state: State, standing: Faults) -> Self {
-        match state {
-            State::Disarmed => Self::RUNNING,
-            State::Armed => Self::new(ARMED, Faults::NONE),
-            State::Faulted(fault) => Self::faulted(fault, standing),
-        }
+        let code = match state {
+            State::Disarmed => RUNNING,
+            State::Armed => ARMED,
+            State::Faulted(fault) => fault.code() as u32,
+        };
+        Self::new(code, standing)
     }
 
     /// The record of a program that shows `fault` while the faults `standing` stand.

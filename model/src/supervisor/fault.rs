@@ -149,8 +149,18 @@ impl Faults {
     }
 
     /// Returns the faults of the set in the order of their numbers.
-    pub fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::ALL.into_iter().filter(move |fault| self.contains(*fault))
+    pub fn iter(mut self) -> impl Iterator<Item = Fault> {
+        core::iter::from_fn(move || {
+            let first = self.first()?;
+            self = self.without(first);
+            Some(first)
+        })
+    }
+
+    /// Returns the fault of the set with the lowest number; `None` if it is empty.
+    #[inline]
+    pub fn first(self) -> Option<Fault> {
+        Fault::ALL.get(self.0.trailing_zeros() as usize).copied()
     }
 
     const fn bit(fault: Fault) -> u16 {

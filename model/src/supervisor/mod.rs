@@ -205,8 +205,9 @@ impl Supervisor {
         let was_armed = self.state == State::Armed;
         let overrun = self.overrun(inputs.missed_ticks);
         let disagreement = self.monitors.update(&self.config, inputs.monitors);
-        if inputs.faults != Faults::NONE {
-            inputs.faults.iter().for_each(|fault| self.fail(fault));
+        if let Some(fault) = inputs.faults.first() {
+            self.fail(fault);
+            self.standing = self.standing.and(inputs.faults);
         }
         if was_armed && !inputs.interlock_closed {
             self.fail(Fault::Interlock);
@@ -285,7 +286,7 @@ impl Supervisor {
             if fault == Fault::Monitor {
                 self.found = None;
             }
-            self.state = self.standing.iter().next().map_or(State::Disarmed, State::Faulted);
+            self.state = self.standing.first().map_or(State::Disarmed, State::Faulted);
         }
     }
 
