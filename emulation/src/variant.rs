@@ -20,13 +20,13 @@ pub(crate) const fn settings(variant: Variant) -> Settings {
 }
 
 /// The number of instructions that a control tick with voltage may need, at least and at most, supervisor included. The
-/// ends are 5 % beyond those that were measured: 300 to 329 with the paper's controller, 370 to 401 with the fast and 426 to 475 with the
+/// ends are 5 % beyond those that were measured: 304 to 337 with the paper's controller, 374 to 404 with the fast and 430 to 478 with the
 /// robust one, whatever the amplifier's limit.
 pub(crate) const fn instructions(variant: Variant) -> RangeInclusive<u64> {
     match variant.controller {
-        Controller::Paper => 285..=345,
-        Controller::Fast => 352..=421,
-        Controller::Robust => 405..=499,
+        Controller::Paper => 289..=354,
+        Controller::Fast => 355..=424,
+        Controller::Robust => 409..=502,
     }
 }
 
