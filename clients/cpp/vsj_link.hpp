@@ -457,12 +457,15 @@ private:
         throw Error(name_ + ": cannot be opened: " + why + "; expected a serial device, unix:PATH or tcp:HOST:PORT");
     }
 
+    /// Whether an event comes before `until`; signals and the longest wait of a call end no wait before that.
     bool wait(short event, Clock::time_point until) const {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
-        pollfd polled{file_, event, 0};
-        const int ready = ::poll(&polled, 1, static_cast<int>(std::clamp<long long>(left, 0, 60'000)));
-        if (ready < 0 && errno != EINTR) fail("the port failed");
-        return ready > 0;
+        for (;;) {
+            const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+            pollfd polled{file_, event, 0};
+            const int ready = ::poll(&polled, 1, static_cast<int>(std::clamp<long long>(left, 0, 60'000)));
+            if (ready < 0 && errno != EINTR) fail("the port failed");
+            if (ready > 0 || Clock::now() >= until) return ready > 0;
+        }
     }
 
     void connect(const sockaddr* address, socklen_t length, Clock::duration timeout) {
@@ -600,6 +603,10 @@ public:
 
     /// Sets the desired stiffness of an armed microcontroller; returns the target in V.
     double set(double value, Unit unit = Unit::volt) {
+        if (!std::isfinite(value)) {
+            const char* name = std::isnan(value) ? "NaN" : value < 0 ? "-inf" : "inf";
+            throw Error(std::string(name) + " is not a stiffness; expected a finite number");
+        }
         return order(wire::Writer().byte(2).byte(static_cast<std::uint8_t>(unit)).real(value).bytes).second;
     }
 

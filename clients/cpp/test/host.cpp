@@ -1,8 +1,12 @@
 // The client and an MCU within this program, which does what no healthy board does.
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <csignal>
 #include <functional>
 #include <iostream>
+
+#include <sys/time.h>
 
 #include <vsj_link.hpp>
 
@@ -13,7 +17,7 @@ namespace {
 using vsj::Bytes;
 using vsj::wire::Writer;
 
-constexpr std::uint8_t hello = 0, ask_status = 1, disarm = 4, heartbeat = 6, stream = 7, heard = 12;
+constexpr std::uint8_t hello = 0, ask_status = 1, set = 2, disarm = 4, heartbeat = 6, stream = 7, heard = 12;
 
 Writer& sample(Writer& message, std::uint64_t tick) {
     message.number(tick);
@@ -220,7 +224,98 @@ void all_addresses_of_a_name() {
     expect(contains(error_of([] { vsj::Link link("tcp:mcu:1"); }), "cannot be opened: Connection refused"), "nobody there");
 }
 
+/// Runs `work` while a signal interrupts this thread every millisecond, and `other` meanwhile in a thread that has none.
+void interrupted(const std::function<void()>& work, const std::function<void()>& other) {
+    struct sigaction ignored{};
+    ignored.sa_handler = [](int) {};
+    ::sigaction(SIGALRM, &ignored, nullptr);
+    sigset_t alarm;
+    sigemptyset(&alarm);
+    sigaddset(&alarm, SIGALRM);
+    ::pthread_sigmask(SIG_BLOCK, &alarm, nullptr);
+    std::thread thread(other);
+    ::pthread_sigmask(SIG_UNBLOCK, &alarm, nullptr);
+    const itimerval every{{0, 1000}, {0, 1000}}, never{};
+    ::setitimer(ITIMER_REAL, &every, nullptr);
+    work();
+    ::setitimer(ITIMER_REAL, &never, nullptr);
+    thread.join();
+}
+
+/// Times that `poll` ends before its time, as one that is longer than the longest wait of a call does.
+std::atomic<int> early_ends{0};
+
+/// Signals end no wait, and no wait ends before its time.
+void waits_that_are_interrupted() {
+    const int listener = listening(ports[0]);
+    ports[1] = ports[0];
+    sockaddr_in address{};
+    socklen_t length = sizeof address;
+    ::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length);
+    // Others wait to be accepted, so that a connection takes a second.
+    int others[4];
+    for (int& file : others) {
+        file = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+        ::connect(file, reinterpret_cast<const sockaddr*>(&address), length);
+    }
+    const Bytes many(8 << 20, 7);
+    std::atomic<bool> is_connected{false};
+    std::size_t received = 0;
+    const auto other_side = [&] {
+        const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(100)); };
+        pause();
+        std::vector<pollfd> files{{listener, POLLIN, 0}};
+        while (!is_connected) {
+            pollfd waiting{listener, POLLIN, 0};
+            const timespec turn{0, 10'000'000};
+            if (::ppoll(&waiting, 1, &turn, nullptr) > 0) files.push_back({::accept(listener, nullptr, nullptr), POLLIN, 0});
+        }
+        // The buffers fill meanwhile.
+        pause();
+        Bytes bytes(1 << 16);
+        while (received < many.size() && ::ppoll(files.data() + 1, files.size() - 1, nullptr, nullptr) > 0) {
+            for (auto& file : files) {
+                if (file.fd == listener || file.revents == 0) continue;
+                const auto count = ::read(file.fd, bytes.data(), bytes.size());
+                received += static_cast<std::size_t>(std::max<ssize_t>(count, 0));
+            }
+        }
+        for (auto& file : files) ::close(file.fd);
+    };
+    early_ends = 3;
+    interrupted(
+        [&] {
+            const auto failure = error_of([&] {
+                vsj::Port port("tcp:mcu:1", 0, std::chrono::seconds(20));
+                is_connected = true;
+                port.write(many);
+            });
+            if (!failure.empty()) std::cerr << failure << '\n';
+            expect(failure.empty(), "a connection and bytes in spite of signals");
+        },
+        other_side);
+    expect(received == many.size() && early_ends == 0, "all bytes");
+    for (const int file : others) ::close(file);
+}
+
+/// What is no number does not reach the microcontroller.
+void targets_that_are_no_numbers() {
+    Mcu mcu;
+    with_link(mcu, [&](vsj::Link& link) {
+        for (const auto& [value, name] : {std::pair(NAN, "NaN"), std::pair(INFINITY, "inf"), std::pair(-INFINITY, "-inf")})
+            expect(error_of([&] { link.set(value); }) == std::string(name) + " is not a stiffness; expected a finite number", name);
+        expect(mcu.asked[set] == 0, "no request");
+    });
+}
+
 }  // namespace
+
+/// In place of the library's: it may end early.
+extern "C" int poll(pollfd* files, nfds_t count, int timeout_ms) {
+    if (timeout_ms > 0 && early_ends > 0) return --early_ends, 0;
+    const timespec timeout{timeout_ms / 1000, timeout_ms % 1000 * 1'000'000};
+    return ::ppoll(files, count, timeout_ms < 0 ? nullptr : &timeout, nullptr);
+}
 
 /// In place of the library's: every name has two addresses.
 extern "C" int getaddrinfo(const char*, const char*, const addrinfo*, addrinfo** found) {
@@ -246,10 +341,12 @@ extern "C" void freeaddrinfo(addrinfo*) noexcept {}
 
 int main() {
     all_addresses_of_a_name();
+    waits_that_are_interrupted();
+    targets_that_are_no_numbers();
     flags_of_a_serial_device();
     samples_that_nobody_takes();
     output_of_another_program();
     end_while_nothing_is_answered();
     numbers_that_run_out();
-    std::puts("dropped samples counted, another program's output left, an end without answers, a session renewed, a serial device set, every address tried");
+    std::puts("waits ended by no signal, targets that are no numbers refused, dropped samples counted, another program's output left, an end without answers, a session renewed, a serial device set, every address tried");
 }
