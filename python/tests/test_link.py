@@ -1,5 +1,6 @@
 """The client of the link: its errors without a board, and the emulated board of `cargo xtask clients`."""
 
+import gc
 import os
 import re
 import signal
@@ -39,7 +40,7 @@ def board_with_bank():
 
 
 # Codes of requests, see docs/link.md.
-HELLO, STATUS, ARM, DISARM, HEARTBEAT, HEARD = 0, 1, 3, 4, 6, 12
+HELLO, STATUS, SET, ARM, DISARM, HEARTBEAT, STREAM, HEARD = 0, 1, 2, 3, 4, 6, 7, 12
 
 
 def checksum(data):
@@ -207,6 +208,51 @@ def test_a_port_that_is_none_is_bad_input_with_the_words_of_the_command(command)
     assert str(raised.value) == command.error("link", port, "status")
     with pytest.raises(vsj.BadInput, match="timeout 0: expected a positive number of seconds"):
         vsj.Link(port, timeout=0)
+
+
+def test_what_is_no_number_is_bad_input_that_names_it(mcu):
+    for options in ({"baud": "fast"}, {"baud": None}, {"baud": 9600.5}, {"baud": -1}, {"timeout": "long"}, {"port": None}):
+        [name] = options
+        with pytest.raises(vsj.BadInput, match=f"^{name}: .*; expected a "):
+            vsj.Link(**({"port": "unix:/nonexistent/link"} | options))
+    with vsj.Link(mcu.port, timeout=25) as link:
+        for name, call in (
+            ("value", lambda: link.set("x")),
+            ("value", lambda: link.set(None)),
+            ("unit", lambda: link.set(1, None)),
+            ("rate_hz", lambda: next(link.watch(rate_hz=None))),
+            ("seconds", lambda: next(link.watch(seconds="x"))),
+            ("seconds", lambda: link.record(seconds="x")),
+            ("seconds", lambda: link.record(seconds="x", schedule=[(0, 0), (1, 0)])),
+            ("schedule", lambda: link.record(schedule=[("x", 0), (1, 0)])),
+            ("file", lambda: link.settings(7)),
+        ):
+            with pytest.raises(vsj.BadInput, match=f"^{name}: .*; expected "):
+                call()
+    mcu.ended()
+
+
+@pytest.mark.parametrize("seconds, length_s", [(None, 0.4), (0.1, 0.4), (0.6, 0.6)])
+def test_a_recording_ends_with_the_schedule_unless_it_is_longer(mcu, seconds, length_s):
+    with vsj.Link(mcu.port, timeout=25) as link:
+        begin = time.monotonic()
+        link.record(schedule=[(0, 0), (0.2, 0), (0.4, 0)], seconds=seconds)
+        assert length_s <= time.monotonic() - begin < length_s + 5
+        with pytest.raises(vsj.BadInput, match="seconds -1: expected a positive number"):
+            link.record(schedule=[(0, 0), (0.2, 0)], seconds=-1)
+    # The last row of a schedule is a target only if something follows.
+    assert mcu.ended()[SET] >= 2
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_an_iterator_may_outlive_its_link(mcu):
+    mcu.ahead[STREAM] = frame(bytes(2), b"\x03" + bytes(10))
+    with vsj.Link(mcu.port, timeout=25) as link:
+        samples = link.watch()
+        assert next(samples).tick == 0
+    mcu.ended()
+    del samples
+    gc.collect()
 
 
 def test_the_link_arms_sets_watches_and_disarms(board):

@@ -144,7 +144,7 @@ def plan(
     if isinstance(diagnosis, Diagnosis):
         name, text = "diagnosis", diagnosis.to_json()
     else:
-        name = _path("diagnosis", diagnosis, "a Diagnosis, or the path of its JSON")
+        name = path_of("diagnosis", diagnosis, "a Diagnosis, or the path of its JSON")
         try:
             with open(name, encoding="utf-8") as file:
                 text = file.read()
@@ -161,10 +161,10 @@ def named_plant(plant):
     text = getattr(plant, "plant", None)
     if isinstance(text, str):
         return type(plant).__name__, text
-    return _path("plant", plant, "paper, a plant file, or an answer with a spring")
+    return path_of("plant", plant, "paper, a plant file, or an answer with a spring")
 
 
-def _path(name, value, expected):
+def path_of(name, value, expected):
     """A path as a text; ``name`` and ``expected`` are for the message."""
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)
@@ -198,5 +198,5 @@ def _options(time, voltage, reading, column, columns, separator, decimal, sort, 
     for name, value in texts.items():
         if value is not None:
             text(name, value)
-    columns = None if columns is None else _path("columns", columns, "the path of a file")
+    columns = None if columns is None else path_of("columns", columns, "the path of a file")
     return dict(texts, columns=columns, sort=bool(sort))

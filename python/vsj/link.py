@@ -1,5 +1,6 @@
 """A running microcontroller over its serial link."""
 
+import contextlib
 import json
 import math
 import os
@@ -11,7 +12,7 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _vsj
-from .analysis import named_plant
+from .analysis import named_plant, number, path_of, text
 from .records import warn
 
 
@@ -130,7 +131,10 @@ class Link:
     """
 
     def __init__(self, port: str, *, baud: int = 115_200, timeout: float = 1.0):
-        self._port = _vsj.Port(port, baud, timeout)
+        rate = number("baud", baud)
+        if not (rate.is_integer() and 0 < rate < 2**32):
+            raise _vsj.BadInput(f"baud: {baud!r}; expected a whole number of bit/s")
+        self._port = _vsj.Port(text("port", port), int(rate), number("timeout", timeout))
 
     def __enter__(self) -> "Link":
         return self
@@ -174,7 +178,7 @@ class Link:
         float
             The target in V.
         """
-        return self._port.set(float(value), unit)[1]
+        return self._port.set(number("value", value), text("unit", unit))[1]
 
     def acknowledge(self, fault: Union[str, int]) -> str:
         """Acknowledge a fault by its name or number. Returns the state."""
@@ -205,7 +209,8 @@ class Link:
         seconds : float, optional
             Length; default: without end.
         """
-        for samples in self._turns(rate_hz, seconds, lambda elapsed_s: None):
+        length_s = math.inf if seconds is None else _length_s(seconds)
+        for samples in self._turns(rate_hz, length_s, lambda elapsed_s: None):
             yield from samples
 
     def record(self, seconds: Optional[float] = None, rate_hz: float = 100.0, schedule: Any = None) -> Any:
@@ -230,10 +235,10 @@ class Link:
         import pandas
 
         waiting = _steps(schedule)
-        if seconds is None:
-            if not waiting:
-                raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
-            seconds = waiting[0][0]
+        if seconds is None and not waiting:
+            raise _vsj.BadInput("record: neither seconds nor a schedule; expected one of them")
+        end_s = waiting[0][0] if waiting else 0.0
+        length_s = max(_length_s(end_s if seconds is None else seconds), end_s)
         status = self.status()
         has_sensor = status["sample"]["measured_v"] is not None
         lowest_v, highest_v = status["lowest_v"], status["highest_v"]
@@ -252,7 +257,7 @@ class Link:
                 is_commanded = True
 
         rows: List[Sample] = []
-        for samples in self._turns(rate_hz, seconds, command):
+        for samples in self._turns(rate_hz, length_s, command):
             rows += samples
             if is_commanded and samples and samples[-1].state not in ("armed", "ramping"):
                 raise _vsj.LinkError(f"no longer armed: the MCU is {samples[-1].state} at {samples[-1].time_s:g} s")
@@ -292,29 +297,40 @@ class Link:
         dict
             ``active`` and ``stored`` as identities, and ``toml``, the running settings as the text of a settings file.
         """
-        blocks, text = self._port.settings(None if file is None else os.fspath(file))
+        blocks, text = self._port.settings(None if file is None else path_of("file", file, "the path of a settings file"))
         return {**json.loads(blocks), "toml": text}
 
-    def _turns(self, rate_hz: float, seconds: Optional[float], command: Callable[[float], None]) -> Iterator[List[Sample]]:
+    def _turns(self, rate_hz: float, length_s: float, command: Callable[[float], None]) -> Iterator[List[Sample]]:
         """Samples in short turns, each after ``command``, which gets the time since the first turn in s."""
-        length_s = math.inf if seconds is None else float(seconds)
-        if not length_s > 0:
-            raise _vsj.BadInput(f"seconds {length_s:g}: expected a positive number of seconds")
-        self._port.stream(float(rate_hz))
+        self._port.stream(number("rate_hz", rate_hz))
         begin = time.monotonic()
         try:
             while (elapsed_s := time.monotonic() - begin) < length_s:
                 command(elapsed_s)
                 yield [Sample._of(row) for row in json.loads(self._port.samples())]
-        finally:
-            self._port.stream(0.0)
+        except BaseException:
+            # An iterator that is left may outlive its link, and what went wrong is reported already.
+            with contextlib.suppress(_vsj.LinkError):
+                self._port.stream(0.0)
+            raise
+        self._port.stream(0.0)
+
+
+def _length_s(seconds: Any) -> float:
+    length_s = number("seconds", seconds)
+    if not length_s > 0:
+        raise _vsj.BadInput(f"seconds {length_s:g}: expected a positive number of seconds")
+    return length_s
 
 
 def _steps(schedule: Any) -> List[Tuple[float, float]]:
     """The rows of a schedule, the last first, with times since its first row."""
     if schedule is None:
         return []
-    rows = np.asarray(schedule, dtype=np.float64)
+    try:
+        rows = np.asarray(schedule, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise _vsj.BadInput("schedule: not all are numbers; expected rows of time in s and voltage in V") from None
     if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) == 0:
         raise _vsj.BadInput(f"schedule: shape {rows.shape}; expected (n, 2), one row or more, with time in s and voltage in V")
     times, voltages = rows.T
