@@ -16,6 +16,7 @@ import tracemalloc
 import types
 
 import distributed
+from pathlib import Path
 import numpy as np
 import pandas
 import psutil
@@ -447,9 +448,9 @@ def test_the_memory_for_each_record_is_at_most_that_of_the_estimate(tmp_path):
     assert len(kept[2]) == count and 0.5 * cost._CLIENT_BYTES < taken / count < cost._CLIENT_BYTES, taken / count
 
 
-def test_a_worker_with_another_version_is_refused(tmp_path):
-    settings = Settings(no_options(), "quick", version="0.0.0")
-    with pytest.raises(RuntimeError, match="expected 0.0.0"):
+def test_a_worker_of_another_build_is_refused(tmp_path):
+    settings = Settings(no_options(), "quick", build="other")
+    with pytest.raises(RuntimeError, match="of vsj; expected other"):
         work.diagnose([], {}, settings, str(tmp_path), str(tmp_path))
 
 
@@ -495,6 +496,21 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         [line] = capsys.readouterr().err.strip().splitlines()
         assert code == 2 and line.startswith("vsj.fleet: ") and part in line, (words, line)
     assert fleet.main([str(folder), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1", "--wait", "1"]) == 1
+@pytest.mark.parametrize("changed", [Path(_vsj.__file__).name, "records.py", "fleet/work.py"])
+def test_another_build_of_the_same_version_has_other_keys(tmp_path, changed):
+    shutil.copytree(Path(vsj.__file__).parent, tmp_path / "vsj", ignore=shutil.ignore_patterns("__pycache__"))
+    program = "import vsj; from vsj.fleet.settings import Settings; print(vsj.__version__, Settings({}, 'quick').key(b'', 'paper'))"
+    # Without caches of compiled files, which would be found by time and size.
+    options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}}
+    keys = lambda: subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, **options).stdout.split()
+    before = keys()
+    assert before == keys()
+    with open(tmp_path / "vsj" / changed, "ab") as file:
+        file.write(b"\n")
+    after = keys()
+    assert after[0] == before[0] == vsj.__version__ and after[1] != before[1]
+
+
     assert "no scheduler answers within 1 s" in capsys.readouterr().err
 
 

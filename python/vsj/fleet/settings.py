@@ -1,17 +1,28 @@
 """What a diagnosis depends on besides its record, and the key of a result.
 
-Two results with the same key are the same: the key is a hash of the record's bytes, the options, the plant's text and the version.
+Two results with the same key are the same: the key is a hash of the record's bytes, the options, the plant's text and the build.
 """
 
 import dataclasses
+import functools
 import hashlib
 import json
+from pathlib import Path
 from typing import Dict, Optional
 
-from .. import __version__
+from .. import _vsj, records
 
 NAMED_PLANTS = ("paper", "identify")
 """Springs that are known by their name; every other is a file."""
+
+
+@functools.lru_cache(maxsize=None)
+def build():
+    """A digest of the files that compute a row: of two builds of one version the diagnoses may differ."""
+    digest = hashlib.sha256()
+    for file in (_vsj.__file__, records.__file__, Path(__file__).with_name("work.py")):
+        digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+    return digest.hexdigest()[:16]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,9 +34,9 @@ class Settings:
     effort: str
     columns: Optional[str] = None
     """Text of the file ``--columns``."""
-    version: str = __version__
+    build: str = dataclasses.field(default_factory=build)
 
     def key(self, content, plant):
         """The key of the diagnosis of a record: ``content`` is the SHA-256 of its bytes, ``plant`` a name or a file's text."""
-        rest = json.dumps([self.version, self.options, self.effort, self.columns, plant], sort_keys=True)
+        rest = json.dumps([self.build, self.options, self.effort, self.columns, plant], sort_keys=True)
         return hashlib.sha256(content + rest.encode()).hexdigest()[:32]

@@ -16,6 +16,7 @@ from pyarrow import parquet
 from .. import BadInput, __version__, _vsj
 from ..records import given
 from .records import filesystem, is_parquet, readable
+from .settings import build
 from .store import write_part
 
 DIAGNOSED, REFUSED, FAILED = "diagnosed", "refused", "failed"
@@ -45,8 +46,8 @@ def diagnose(batch, plants, settings, folder, out):
     list of (key, status, is_new)
         One for each record of the batch, in its order.
     """
-    if settings.version != __version__:
-        raise RuntimeError(f"this worker has vsj {__version__}; expected {settings.version}, as the program that sent the work")
+    if settings.build != build():
+        raise RuntimeError(f"this worker has build {build()} of vsj; expected {settings.build}, as the program that sent the work")
     rows, done = [], []
     for record in batch:
         row = _row(record, plants, settings, folder)
