@@ -1,5 +1,6 @@
 """The fleet: every record has one row, whatever dies on the way, and the page says what is in the rows."""
 
+import ast
 import datetime
 import gc
 import json
@@ -12,11 +13,12 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 import tracemalloc
 import types
+from pathlib import Path
 
 import distributed
-from pathlib import Path
 import numpy as np
 import pandas
 import psutil
@@ -595,6 +597,18 @@ def test_a_name_with_several_folders_is_a_spring(tmp_path):
 
 def test_files_that_are_no_records_are_counted(tmp_path):
     for name in ("a.CSV", "b.csv", ".hidden.csv", ".git/c.csv", "~$b.csv", "note.txt"):
+def test_the_extra_brings_every_package_that_the_fleet_imports():
+    project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
+    listed = {re.match(r"\w+", it)[0] for it in (*project["dependencies"], *project["optional-dependencies"]["fleet"])}
+    trees = [ast.parse(path.read_text()) for path in (ROOT / "python/vsj/fleet").glob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = {it.name for node in nodes if isinstance(node, ast.Import) for it in node.names}
+    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    needed = {name.partition(".")[0] for name in names} - sys.stdlib_module_names
+    # dask needs fsspec, and jinja2 markupsafe; SLURM's package is named by its own error.
+    assert needed - {"fsspec", "markupsafe", "dask_jobqueue"} <= listed
+
+
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     os.mkfifo(tmp_path / "pipe.csv")
