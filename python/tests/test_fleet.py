@@ -725,3 +725,18 @@ def test_the_commands_of_the_manual_run(copied, tmp_path, monkeypatch, capsys):
     for words, printed in ((commands[0], "wrote out/fleet/fleet.html"), (commands[-1], "1000000 records in batches of 64")):
         assert fleet.main(words) == 0
         assert printed in capsys.readouterr().out
+def test_the_cost_in_the_manual_is_what_the_formulas_give_for_its_measured_values(capsys, monkeypatch):
+    manual = (ROOT / "docs/fleet.md").read_text()
+    [command, printed] = re.search(r"python -m vsj.fleet (--cost .*?)\n```\n\n```text\n(.*?)```", manual, re.DOTALL).groups()
+    first = {line[:40].strip(): [float(it) for it in re.findall(r"[\d.]+", line[40:])] for line in printed.splitlines()[:4]}
+    [records], [seconds], [record_kb, row_kb], [task_ms] = first.values()
+    small = cost.Measured(int(records), seconds, 1e3 * record_kb, 1e3 * row_kb, task_ms / 1e3)
+    monkeypatch.setattr(cost, "measured", lambda out: small)
+    assert fleet.main(shlex.split(command)) == 0
+    assert capsys.readouterr().out == printed
+    cores, price = 500, 0.04
+    assert f"--cores {cores} --price {price} --batch 64" in command
+    of = cost.estimate(small, 1_000_000, cores, price, 16)
+    assert f"With `--batch 16` the same takes {of.time_s / 3600:.2f} h, {of.end_s / 3600:.2f} h of it at the end" in " ".join(manual.split())
+
+
