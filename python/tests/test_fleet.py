@@ -376,6 +376,46 @@ def test_records_and_results_may_be_in_an_object_store(copied, engine):
     assert not [it for it in fs.find("/lab/fleet") if it.endswith(".partial")]
 
 
+def test_an_exception_of_an_object_stores_package_is_one_line_with_the_address(tmp_path, capsys):
+    import fsspec
+
+    class NoCredentialsError(Exception):
+        """As of botocore, no ``OSError``."""
+
+    def refuse(*_, **__):
+        raise NoCredentialsError("Unable to locate credentials\nof anybody")
+
+    store_of_others = type("Store", (fsspec.AbstractFileSystem,), {"protocol": "lab", "cachable": False, "info": refuse, "ls": refuse, "_open": refuse})
+    fsspec.register_implementation("lab", store_of_others, clobber=True)
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s/a.csv").touch()
+    folder, out = str(tmp_path / "s"), str(tmp_path / "out")
+    for words, address in (
+        (["lab://b/x", "--out", out], "lab://b/x: cannot be read as"),
+        ([folder, "--out", "lab://b/y"], "--out lab://b/y: cannot be written"),
+        ([folder, "--out", out, "--plant", "lab://b/p.toml"], "--plant lab://b/p.toml: cannot be read"),
+        (["--cost", "10", "--out", "lab://b/y"], "b/y/diagnoses.parquet: cannot be read as results"),
+    ):
+        assert fleet.main(words) == 2, words
+        [line] = capsys.readouterr().err.strip().splitlines()
+        assert line.startswith("vsj.fleet: " + address) and "Unable to locate credentials" in line, line
+
+
+@pytest.mark.parametrize("module, name", [(store, "write_table"), (fleet, "summary"), (page, "page"), (records, "listed"), (cost, "measured")])
+def test_ctrl_c_before_and_after_the_diagnoses_is_one_line_too(copied, tmp_path, engine, monkeypatch, capsys, module, name):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    words = [str(copied), "--out", str(tmp_path / "out"), "--scheduler", engine, "--effort", "quick"]
+    if name == "measured":
+        words = ["--cost", "10", *words[1:3]]
+    monkeypatch.setattr(module, name, interrupted)
+    assert fleet.main(words) == 130
+    [line] = capsys.readouterr().err.strip().splitlines()
+    far = "" if name in ("listed", "measured") else "; at least 4 of 4 records are finished; the same command goes on"
+    assert line == f"vsj.fleet: interrupted{far}"
+
+
 def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp_path, monkeypatch):
     out, _ = str(tmp_path / "out"), (tmp_path / "out").mkdir()
     address, table = records.listed(copied)

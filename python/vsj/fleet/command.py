@@ -41,6 +41,8 @@ def main(arguments=None):
         return _diagnose(wanted)
     except BadInput as error:
         return _said(error, 2)
+    except KeyboardInterrupt:
+        return _said("interrupted", 130)
     except FileNotFoundError as error:
         return _said(f"{error.filename or error}: not found", 2)
     except (OSError, RuntimeError) as error:
@@ -81,13 +83,13 @@ def _diagnose(wanted):
 
             with cluster.connected(wanted.scheduler, wanted.workers, wanted.wait) as client:
                 outcome = run.run(client, table, settings, plants, folder, out, wanted.batch, show)
+        store.write_table(out, table, outcome.key)
+        found = summary(store.rows(out))
+        store.write_text(out, page.NAME, page.page(found, wanted.records, settings))
     except KeyboardInterrupt:
         return _said(f"interrupted; {_progress(outcome, count)}", 130)
     except run.SchedulerLost as error:
         return _said(f"--scheduler {wanted.scheduler}: {error}; {_progress(outcome, count)}", 1)
-    store.write_table(out, table, outcome.key)
-    found = summary(store.rows(out))
-    store.write_text(out, page.NAME, page.page(found, wanted.records, settings))
     errors = outcome.refused + int(outcome.failed.sum())
     if wanted.json:
         print(json.dumps(_json(found, outcome)))
