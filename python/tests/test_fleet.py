@@ -496,6 +496,21 @@ def test_a_worker_of_another_build_is_refused(tmp_path):
         work.diagnose([], {}, settings, str(tmp_path), str(tmp_path))
 
 
+@pytest.mark.parametrize("changed", [Path(_vsj.__file__).name, "records.py", "fleet/work.py"])
+def test_another_build_of_the_same_version_has_other_keys(tmp_path, changed):
+    shutil.copytree(Path(vsj.__file__).parent, tmp_path / "vsj", ignore=shutil.ignore_patterns("__pycache__"))
+    program = "import vsj; from vsj.fleet.settings import Settings; print(vsj.__version__, Settings({}, 'quick').key(b'', 'paper'))"
+    # Without caches of compiled files, which would be found by time and size.
+    options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}}
+    keys = lambda: subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, **options).stdout.split()
+    before = keys()
+    assert before == keys()
+    with open(tmp_path / "vsj" / changed, "ab") as file:
+        file.write(b"\n")
+    after = keys()
+    assert after[0] == before[0] == vsj.__version__ and after[1] != before[1]
+
+
 def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
     folder, empty = tmp_path / "springs", tmp_path / "empty"
     for it in (folder / "a", empty):
@@ -538,21 +553,6 @@ def test_bad_arguments_end_with_2_and_one_line(tmp_path, engine, capsys):
         [line] = capsys.readouterr().err.strip().splitlines()
         assert code == 2 and line.startswith("vsj.fleet: ") and part in line, (words, line)
     assert fleet.main([str(folder), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1", "--wait", "1"]) == 1
-@pytest.mark.parametrize("changed", [Path(_vsj.__file__).name, "records.py", "fleet/work.py"])
-def test_another_build_of_the_same_version_has_other_keys(tmp_path, changed):
-    shutil.copytree(Path(vsj.__file__).parent, tmp_path / "vsj", ignore=shutil.ignore_patterns("__pycache__"))
-    program = "import vsj; from vsj.fleet.settings import Settings; print(vsj.__version__, Settings({}, 'quick').key(b'', 'paper'))"
-    # Without caches of compiled files, which would be found by time and size.
-    options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}}
-    keys = lambda: subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, **options).stdout.split()
-    before = keys()
-    assert before == keys()
-    with open(tmp_path / "vsj" / changed, "ab") as file:
-        file.write(b"\n")
-    after = keys()
-    assert after[0] == before[0] == vsj.__version__ and after[1] != before[1]
-
-
     assert "no scheduler answers within 1 s" in capsys.readouterr().err
 
 
@@ -597,6 +597,18 @@ def test_a_plant_of_the_manifest_is_not_the_file_of_the_same_name_that_the_optio
     assert fleet.main([*words, "--effort", "quick"]) == 0
 
 
+def test_the_extra_brings_every_package_that_the_fleet_imports():
+    project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
+    listed = {re.match(r"\w+", it)[0] for it in (*project["dependencies"], *project["optional-dependencies"]["fleet"])}
+    trees = [ast.parse(path.read_text()) for path in (ROOT / "python/vsj/fleet").glob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = {it.name for node in nodes if isinstance(node, ast.Import) for it in node.names}
+    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    needed = {name.partition(".")[0] for name in names} - sys.stdlib_module_names
+    # dask needs fsspec, and jinja2 markupsafe; SLURM's package is named by its own error.
+    assert needed - {"fsspec", "markupsafe", "dask_jobqueue"} <= listed
+
+
 @pytest.mark.parametrize("package", ["distributed", "pyarrow"])
 def test_without_its_packages_the_command_says_what_to_install(package):
     program = f"import sys, runpy; sys.modules['{package}'] = None; runpy.run_module('vsj.fleet', run_name='__main__')"
@@ -637,18 +649,6 @@ def test_a_name_with_several_folders_is_a_spring(tmp_path):
 
 def test_files_that_are_no_records_are_counted(tmp_path):
     for name in ("a.CSV", "b.csv", ".hidden.csv", ".git/c.csv", "~$b.csv", "note.txt"):
-def test_the_extra_brings_every_package_that_the_fleet_imports():
-    project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
-    listed = {re.match(r"\w+", it)[0] for it in (*project["dependencies"], *project["optional-dependencies"]["fleet"])}
-    trees = [ast.parse(path.read_text()) for path in (ROOT / "python/vsj/fleet").glob("*.py")]
-    nodes = [node for tree in trees for node in ast.walk(tree)]
-    names = {it.name for node in nodes if isinstance(node, ast.Import) for it in node.names}
-    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
-    needed = {name.partition(".")[0] for name in names} - sys.stdlib_module_names
-    # dask needs fsspec, and jinja2 markupsafe; SLURM's package is named by its own error.
-    assert needed - {"fsspec", "markupsafe", "dask_jobqueue"} <= listed
-
-
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     os.mkfifo(tmp_path / "pipe.csv")
@@ -745,6 +745,21 @@ def test_the_cost_of_a_larger_fleet_is_what_the_page_of_formulas_says():
     assert "bottleneck                              cores" in cost.text(small, of)
 
 
+def test_the_cost_in_the_manual_is_what_the_formulas_give_for_its_measured_values(capsys, monkeypatch):
+    manual = (ROOT / "docs/fleet.md").read_text()
+    [command, printed] = re.search(r"python -m vsj.fleet (--cost .*?)\n```\n\n```text\n(.*?)```", manual, re.DOTALL).groups()
+    first = {line[:40].strip(): [float(it) for it in re.findall(r"[\d.]+", line[40:])] for line in printed.splitlines()[:4]}
+    [records], [seconds], [record_kb, row_kb], [task_ms] = first.values()
+    small = cost.Measured(int(records), seconds, 1e3 * record_kb, 1e3 * row_kb, task_ms / 1e3)
+    monkeypatch.setattr(cost, "measured", lambda out: small)
+    assert fleet.main(shlex.split(command)) == 0
+    assert capsys.readouterr().out == printed
+    cores, price = 500, 0.04
+    assert f"--cores {cores} --price {price} --batch 64" in command
+    of = cost.estimate(small, 1_000_000, cores, price, 16)
+    assert f"With `--batch 16` the same takes {of.time_s / 3600:.2f} h, {of.end_s / 3600:.2f} h of it at the end" in " ".join(manual.split())
+
+
 def test_the_schema_of_the_table_is_in_the_manual():
     manual = (ROOT / "docs/fleet.md").read_text()
     assert [name for name in store.SCHEMA.names if f"`{name}`" not in manual] == []
@@ -765,18 +780,3 @@ def test_the_commands_of_the_manual_run(copied, tmp_path, monkeypatch, capsys):
     for words, printed in ((commands[0], "wrote out/fleet/fleet.html"), (commands[-1], "1000000 records in batches of 64")):
         assert fleet.main(words) == 0
         assert printed in capsys.readouterr().out
-def test_the_cost_in_the_manual_is_what_the_formulas_give_for_its_measured_values(capsys, monkeypatch):
-    manual = (ROOT / "docs/fleet.md").read_text()
-    [command, printed] = re.search(r"python -m vsj.fleet (--cost .*?)\n```\n\n```text\n(.*?)```", manual, re.DOTALL).groups()
-    first = {line[:40].strip(): [float(it) for it in re.findall(r"[\d.]+", line[40:])] for line in printed.splitlines()[:4]}
-    [records], [seconds], [record_kb, row_kb], [task_ms] = first.values()
-    small = cost.Measured(int(records), seconds, 1e3 * record_kb, 1e3 * row_kb, task_ms / 1e3)
-    monkeypatch.setattr(cost, "measured", lambda out: small)
-    assert fleet.main(shlex.split(command)) == 0
-    assert capsys.readouterr().out == printed
-    cores, price = 500, 0.04
-    assert f"--cores {cores} --price {price} --batch 64" in command
-    of = cost.estimate(small, 1_000_000, cores, price, 16)
-    assert f"With `--batch 16` the same takes {of.time_s / 3600:.2f} h, {of.end_s / 3600:.2f} h of it at the end" in " ".join(manual.split())
-
-

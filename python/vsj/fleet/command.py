@@ -136,8 +136,8 @@ def _text(url, option):
     fs, path = records.filesystem(url)
     try:
         return fs.cat_file(path).decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{option} {url}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    except Exception as error:
+        raise BadInput(f"{option} {url}: cannot be read: {getattr(error, 'strerror', None) or records.reason(error)}") from error
 
 
 def _json(found, outcome):

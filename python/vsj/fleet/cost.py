@@ -26,7 +26,7 @@ from distributed import Client, LocalCluster, as_completed
 
 from .. import BadInput
 from . import store
-from .records import filesystem
+from .records import filesystem, readable
 
 CORES, PRICE = 100, 0.04
 """Cores, and the price of one for an hour, unless others are given."""
@@ -78,15 +78,18 @@ def measured(out):
     """What the results in ``out`` and this machine show."""
     fs, path = filesystem(out)
     table = posixpath.join(path, store.TABLE)
-    if not fs.exists(table):
-        raise BadInput(f"{out}: no {store.TABLE}; expected the results of a smaller fleet")
+    with readable(table, "results"):
+        try:
+            table_bytes = fs.size(table)
+        except FileNotFoundError:
+            raise BadInput(f"{out}: no {store.TABLE}; expected the results of a smaller fleet") from None
     count, seconds, size = 0, 0.0, 0
     for row in store.rows(out):
         if row["seconds"] is not None and row["bytes"] is not None:
             count, seconds, size = count + 1, seconds + row["seconds"], size + row["bytes"]
     if not count:
         raise BadInput(f"{out}: no record with a time; expected one or more")
-    return Measured(count, seconds / count, size / count, fs.size(table) / count, task_s())
+    return Measured(count, seconds / count, size / count, table_bytes / count, task_s())
 
 
 def task_s():

@@ -49,13 +49,21 @@ def absolute(url):
 
 @contextmanager
 def readable(name, expected):
-    """A block that reads a file; if its content is damaged or another than ``expected``, raises BadInput with its name."""
+    """A block that reads a file; if its content is damaged or another than ``expected``, raises BadInput with its name.
+
+    So it does for every exception of a file system, whose package has its own: of S3 some are no ``OSError``.
+    """
     try:
         yield
-    except BadInput:
+    except (BadInput, MemoryError):
         raise
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise BadInput(f"{name}: cannot be read as {expected}: {str(error).splitlines()[0]}") from error
+    except Exception as error:
+        raise BadInput(f"{name}: cannot be read as {expected}: {reason(error)}") from error
+
+
+def reason(error):
+    """What an exception says, in one line."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def is_parquet(path):
@@ -70,12 +78,13 @@ def listed(url, results=(), remark=lambda text: None):
     know about the others. Raises BadInput if there is none, or the manifest's columns are not as expected.
     """
     fs, path = filesystem(url)
-    if fs.isfile(path):
-        folder, table = posixpath.dirname(path), _manifest(fs, path, url)
-    elif fs.isdir(path):
-        folder, table = path, _folder(fs, path, results, remark)
-    else:
-        raise BadInput(f"{url}: not found; expected a folder of records, or a manifest")
+    with readable(url, "a folder of records, or a manifest"):
+        if fs.isfile(path):
+            folder, table = posixpath.dirname(path), _manifest(fs, path, url)
+        elif fs.isdir(path):
+            folder, table = path, _folder(fs, path, results, remark)
+        else:
+            raise BadInput(f"{url}: not found; expected a folder of records, or a manifest")
     if table.num_rows == 0:
         raise BadInput(f"{url}: no record; expected files {' or '.join('*' + it for it in ENDINGS)}, one or more")
     table = table.sort_by([("spring", "ascending"), ("time", "ascending"), ("record", "ascending")])

@@ -17,7 +17,7 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from .. import BadInput
-from .records import filesystem, readable
+from .records import filesystem, readable, reason
 
 QUANTITY = pa.struct(
     [("name", pa.string()), ("value", pa.float64()), ("low", pa.float64()), ("high", pa.float64()), ("unit", pa.string())]
@@ -72,8 +72,8 @@ def expect_writable(out):
         with fs.open(probe, "wb") as file:
             file.write(b"vsj")
         fs.rm(probe)
-    except OSError as error:
-        raise BadInput(f"--out {out}: cannot be written ({error}); expected a folder or URL for the results") from error
+    except Exception as error:
+        raise BadInput(f"--out {out}: cannot be written ({reason(error)}); expected a folder or URL for the results") from error
 
 
 def write_part(out, rows):
@@ -98,7 +98,8 @@ def finished(out):
     # Workers have written there since this program has listed it.
     fs.invalidate_cache()
     folder = posixpath.join(path, _PARTS)
-    parts = sorted(it for it in fs.find(folder) if it.endswith(".parquet")) if fs.isdir(folder) else []
+    with readable(folder, "results"):
+        parts = sorted(it for it in fs.find(folder) if it.endswith(".parquet")) if fs.isdir(folder) else []
 
     def names(part):
         with readable(part, "results"), fs.open(part, "rb") as file:
