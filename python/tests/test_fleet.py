@@ -148,7 +148,7 @@ def test_ctrl_c_ends_the_run_also_where_python_drops_the_exception(copied, tmp_p
         def __del__(self):
             os.kill(os.getpid(), signal.SIGINT)
 
-    def interrupted(client, table, settings, plants, folder, out, batch_size, on_progress):
+    def interrupted(client, table, settings, plants, folder, out, batch_size, on_progress, wait_s):
         Dropped()
         on_progress(run.Outcome(len(table)))
         pytest.fail("the run goes on")
@@ -156,6 +156,23 @@ def test_ctrl_c_ends_the_run_also_where_python_drops_the_exception(copied, tmp_p
     monkeypatch.setattr(run, "run", interrupted)
     assert fleet.main([str(copied), "--out", str(tmp_path / "out"), "--scheduler", engine]) == 130
     assert "interrupted; at least 0 of 4 records are finished" in capsys.readouterr().err
+
+
+def test_workers_that_leave_for_good_end_the_run(folder, tmp_path, capsys):
+    out = tmp_path / "out"
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+
+        def leave():
+            until(lambda: len(parts(out)) >= 3)
+            cluster.scale(0)
+
+        leaving = threading.Thread(target=leave)
+        leaving.start()
+        code = fleet.main([str(folder), "--out", str(out), "--scheduler", cluster.scheduler_address, "--batch", "1", "--wait", "2"])
+        leaving.join()
+    assert code == 1
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert re.fullmatch(r"vsj\.fleet: --scheduler tcp:.*: no worker for 2 s; expected one or more; at least \d+ of 36 records .*", line), line
 
 
 def test_after_a_killed_scheduler_the_next_run_goes_on(folder, tmp_path, engine, capsys):
@@ -431,7 +448,7 @@ def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
         cluster.scheduler.allowed_failures = 0
         with distributed.Client(cluster) as client:
-            outcome = run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, out, 2, lambda _: None)
+            outcome = run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, out, 2, lambda _: None, 60)
     assert outcome.new == 4 and list(outcome.failed) == [False, True, False, False]
     there = store.finished(out).to_pandas().set_index("record")
     assert there.loc[fatal, "status"] == "failed" and len(there) == 4
@@ -455,7 +472,7 @@ def test_a_bounded_number_of_batches_is_in_progress(folder, tmp_path, engine, mo
             return submit(*arguments, **options)
 
         monkeypatch.setattr(client, "submit", counted)
-        run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, str(tmp_path / "out"), 1, ended.append)
+        run.run(client, table, Settings(no_options(), "quick"), {"paper": None}, address, str(tmp_path / "out"), 1, ended.append, 60)
     assert len(ended) == SPRINGS * RECORDS and most == run._AHEAD
 
 

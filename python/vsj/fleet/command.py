@@ -24,7 +24,7 @@ RECORDS is a folder with SPRING/DATE.csv, or .parquet, or a CSV or Parquet manif
 spring, time, plant. The same command goes on where an earlier one ended, however it ended. In --out: diagnoses.parquet, a row for
 each record; fleet.html, the summary; parts/, the state.
 
-Exit codes: 0 every record is diagnosed, 1 a record has an error in its row, or the scheduler is lost, 2 bad arguments or input,
+Exit codes: 0 every record is diagnosed, 1 a record has an error in its row, or scheduler or workers are lost, 2 bad arguments or input,
 130 Ctrl-C."""
 
 
@@ -82,7 +82,7 @@ def _diagnose(wanted):
                 bar.set_postfix(refused=now.refused, failed=int(now.failed.sum()), refresh=False)
 
             with cluster.connected(wanted.scheduler, wanted.workers, wanted.wait) as client:
-                outcome = run.run(client, table, settings, plants, folder, out, wanted.batch, show)
+                outcome = run.run(client, table, settings, plants, folder, out, wanted.batch, show, wanted.wait)
         store.write_table(out, table, outcome.key)
         found = summary(store.rows(out))
         store.write_text(out, page.NAME, page.page(found, wanted.records, settings))
@@ -223,7 +223,7 @@ def _parser():
     add("--out", default="out/fleet", metavar="DIR", help="folder or URL of the results; default: out/fleet")
     add("--scheduler", default="local", metavar="ADDRESS", help="local, slurm, or the address of a Dask scheduler, tcp://HOST:8786; default: local")
     add("--workers", type=_number(int, 1), metavar="N", help="processes (local) or jobs (slurm); default: one for each core, or one job")
-    add("--wait", type=_number(float, 1, 1_000_000), default=600, metavar="S", help="longest time until the first worker is there, in s; default: 600")
+    add("--wait", type=_number(float, 1, 1_000_000), default=600, metavar="S", help="longest time without a worker, at the start and later, in s; default: 600")
     add("--batch", type=_number(int, 1, 100_000), default=16, metavar="N", help="records in one task, and in one file of the state; default: 16")
     add("--json", action="store_true", help="print the summary as one JSON object")
     add("--version", action="version", version=f"vsj {__version__}")

@@ -7,6 +7,7 @@ that says so. If the scheduler is lost, the run ends; the next one goes on with 
 
 import signal
 import threading
+import time
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 
@@ -18,6 +19,10 @@ from . import store, work
 
 _AHEAD = 3
 """Batches in progress for each thread of a worker: one that is computed, and two that wait there."""
+_POLL_S = 0.01
+"""Time between two looks at what has ended, in s."""
+_ASK_S = 1.0
+"""Time between two questions for the workers, while nothing ends, in s."""
 
 
 def next_size(left, batch_size, threads):
@@ -29,7 +34,7 @@ def next_size(left, batch_size, threads):
 
 
 class SchedulerLost(ConnectionError):
-    """The scheduler has gone, and with it the work in progress."""
+    """The scheduler has gone, or every worker, and with it the work in progress."""
 
 
 class Outcome:
@@ -78,7 +83,24 @@ def interrupts():
         signal.signal(signal.SIGINT, before)
 
 
-def run(client, records, settings, plants, folder, out, batch_size, on_progress):
+def _ended(completed, client, wait_s):
+    """The futures of ``completed`` as they end; raises SchedulerLost after ``wait_s`` without a worker."""
+    seen = asked = time.monotonic()
+    while not completed.is_empty():
+        if completed.has_ready():
+            yield next(completed)
+            continue
+        time.sleep(_POLL_S)
+        now = time.monotonic()
+        if now - asked >= _ASK_S:
+            asked = now
+            if client.nthreads():
+                seen = now
+            elif now - seen >= wait_s:
+                raise SchedulerLost(f"no worker for {wait_s:g} s; expected one or more")
+
+
+def run(client, records, settings, plants, folder, out, batch_size, on_progress, wait_s):
     """Diagnose what is not finished.
 
     Parameters
@@ -95,6 +117,8 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
         Most records in one task and one part.
     on_progress : callable
         Called with the :class:`Outcome` after each batch.
+    wait_s : float
+        Longest time without a worker, in s.
 
     Returns
     -------
@@ -135,7 +159,7 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress)
 
     try:
         fill()
-        for future in completed:
+        for future in _ended(completed, client, wait_s):
             start, rows, alone = in_progress.pop(future)
             try:
                 done = future.result()
