@@ -11,8 +11,11 @@ use crate::unit::Unit;
 use crate::variable::{Form, Role, Variable};
 use crate::variables::variables;
 
-/// Largest distance of a time from a tick, in ticks: importers add up steps, whose rounding errors add up too.
+/// Largest distance of a time from a tick, in ticks: importers add up steps, whose rounding errors add up too. To it comes the distance
+/// between two doubles at that time, which in s since 1970 at 10 kHz is larger.
 const TOLERANCE: f64 = 1e-3;
+/// Largest distance in ticks where doubles lie further apart, so that a time is near one tick only.
+const MOST_TOLERANCE: f64 = 0.25;
 /// Most ticks of one step.
 const MOST_TICKS: f64 = 1e10;
 
@@ -172,8 +175,11 @@ impl Instance {
         let (now, end) = ((from_s - *start_s) * rate_hz, (from_s + step_s - *start_s) * rate_hz);
         let time_s = |ticks: u64| *start_s + ticks as f64 / rate_hz;
         // NaN is near nothing.
-        let is_near = |time: f64, tick: f64| (time - tick).abs() <= TOLERANCE;
-        if !is_near(now, *ticks as f64) {
+        let is_near = |time_s: f64, time: f64, tick: f64| {
+            let spacing_s = time_s.abs().next_up() - time_s.abs();
+            (time - tick).abs() <= (TOLERANCE + spacing_s * rate_hz).min(MOST_TOLERANCE)
+        };
+        if !is_near(from_s, now, *ticks as f64) {
             bad_input!(
                 "a step begins at {} s: expected {} s, where the last one has ended",
                 number(from_s),
@@ -181,7 +187,7 @@ impl Instance {
             );
         }
         let last = end.round();
-        if !is_near(end, last) || last <= *ticks as f64 {
+        if !is_near(from_s + step_s, end, last) || last <= *ticks as f64 {
             bad_input!(
                 "a step of {} s is {} ticks: expected a whole number of ticks of {} s",
                 number(step_s),
@@ -263,6 +269,24 @@ mod tests {
         instance.step(5.002, 0.001).expect("the saved state");
         instance.reset();
         instance.begin_at(0.0).expect("an instance as at first");
+    }
+
+    #[test]
+    fn steps_at_a_time_since_1970_are_whole_ticks_as_far_as_doubles_go() {
+        let step_s = 1e-4;
+        for (start_s, is_fine) in [(0.0, true), (1.7e9, true), (-1.7e9, true), (1e13, false)] {
+            let options = Options { rate_hz: 1.0 / step_s, ..Options::PAPER };
+            let plant = plant_file::load("paper").expect("it is built in");
+            let mut instance = Instance::new(Unit { kind: Kind::Spring, plant, options }, Box::new(|_| ()));
+            instance.begin_at(start_s).expect("an instance");
+            instance.enter_initialization().expect("an instance");
+            instance.exit_initialization().expect("parameters in their ranges");
+            let times = (0..10_000).map(|number| start_s + f64::from(number) * step_s);
+            let found = times.into_iter().try_for_each(|time_s| instance.step(time_s, step_s));
+            assert_eq!(found.is_ok(), is_fine, "{start_s}: {found:?}");
+            let half = instance.step(instance.time_s(), 0.5 * step_s).expect_err("half a tick").to_string();
+            assert!(half.contains("expected"), "{half}");
+        }
     }
 
     fn instance(plant: plant_file::PlantFile) -> Instance {
