@@ -197,6 +197,37 @@ fn messages_of_others_have_fields_inside_objects_and_times_in_two_parts() {
     ];
     let other: &[&str] = &["\0", "\0"];
     let file = foreign(&[("/spring", "json", &messages), ("/camera", "cdr", other)]);
+#[test]
+fn a_recording_cut_in_a_chunk_larger_than_the_rest_of_the_file_keeps_the_chunks_before() {
+    let mut file = Vec::new();
+    let sheet = Sheet { name: "record", source: "a test", columns: &RECORD };
+    let mut writer = Writer::new(Container::Mcap, &sheet, &mut file).unwrap();
+    let rows: Vec<_> = (0..5_000).map(|row| (f64::from(row), 0.1, f64::from(row * 7_919 % 5_003) / 7.0)).collect();
+    for (number, row) in record(&rows).iter().enumerate() {
+        writer.row(number as u64, row).unwrap();
+        if number == 2 {
+            writer.flush().unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let (mut at, mut chunks) = (mcap::MAGIC.len(), 0);
+    let cut = loop {
+        let (&[opcode, ref length @ ..], _) =
+            file[at..].split_first_chunk::<9>().expect("a third chunk, after those of the schema and of three rows");
+        let (length, cut) = (u64::from_le_bytes(*length) as usize, at + 100);
+        chunks += usize::from(opcode == op::CHUNK);
+        if chunks == 3 {
+            assert!(length > cut, "{length} of {cut}");
+            break cut;
+        }
+        at += 9 + length;
+    };
+    file.truncate(cut);
+    let found = parsed(Container::Mcap, file, &Format::default());
+    assert_eq!(found.record.rows.len(), 3);
+    assert!(found.remarks[0].starts_with("r: cut off after 3 messages"), "{:?}", found.remarks);
+}
+
     let columns = ColumnNames {
         time: Some("stamp".into()),
         voltage: Some("drive.u:kV".into()),

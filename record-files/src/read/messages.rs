@@ -33,12 +33,12 @@ pub(super) fn each_message(
     let mut messages = Messages { name, linked: ChannelAccumulator::default(), count: 0, each };
     let Some(mut rest) = bytes.strip_prefix(MAGIC) else { return Err(messages.damaged(&McapError::BadMagic).into()) };
     loop {
-        match next(&mut rest, bytes.len()) {
+        match next(&mut rest) {
             // What follows repeats what has been read.
-            Ok((op::DATA_END | op::FOOTER, _)) => return Ok(None),
-            Ok((opcode, body)) => messages.record(opcode, body)?,
-            Err(error @ McapError::UnexpectedEof) if messages.count > 0 => return Ok(Some(error)),
-            Err(error) => return Err(messages.damaged(&error).into()),
+            Some((op::DATA_END | op::FOOTER, _)) => return Ok(None),
+            Some((opcode, body)) => messages.record(opcode, body)?,
+            None if messages.count > 0 => return Ok(Some(McapError::UnexpectedEof)),
+            None => return Err(messages.damaged(&McapError::UnexpectedEof).into()),
         }
     }
 }
@@ -53,15 +53,12 @@ struct Messages<'a, F> {
 /// Bytes before the content of a record in a chunk: its kind and its length.
 const HEAD: usize = 9;
 
-/// The kind and the content of the next record of `rest`, which has at most `most` bytes.
-fn next<'a>(rest: &mut &'a [u8], most: usize) -> Result<(u8, &'a [u8]), McapError> {
-    let (&[opcode, ref length @ ..], after) = rest.split_first_chunk::<HEAD>().ok_or(McapError::UnexpectedEof)?;
-    let len = u64::from_le_bytes(*length);
-    let length = usize::try_from(len).ok().filter(|length| *length <= most);
-    let length = length.ok_or(McapError::RecordTooLarge { opcode, len })?;
-    let (body, next) = after.split_at_checked(length).ok_or(McapError::UnexpectedEof)?;
+/// The kind and the content of the next record; `None` if it is longer than `rest`, which was cut off then.
+fn next<'a>(rest: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
+    let (&[opcode, ref length @ ..], after) = rest.split_first_chunk::<HEAD>()?;
+    let (body, next) = after.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
     *rest = next;
-    Ok((opcode, body))
+    Some((opcode, body))
 }
 
 /// `None` if a text of a record is longer than the record.
@@ -132,7 +129,7 @@ impl<F: FnMut(&Message<'_>) -> Result<()>> Messages<'_, F> {
         }
         let mut rest: &[u8] = &content;
         while !rest.is_empty() {
-            let (opcode, body) = next(&mut rest, usize::MAX).map_err(|_| self.damaged(&McapError::UnexpectedEoc))?;
+            let (opcode, body) = next(&mut rest).ok_or_else(|| self.damaged(&McapError::UnexpectedEoc))?;
             if opcode != op::CHUNK {
                 self.record(opcode, body)?;
             }
