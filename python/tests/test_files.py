@@ -11,11 +11,13 @@ from conftest import SAMPLE
 
 def test_a_parquet_file_of_polars_is_the_record_that_its_csv_is(command, sample, tmp_path):
     file = tmp_path / "sample.parquet"
-    polars.DataFrame(sample).write_parquet(file, compression="snappy")
-    found, expected = (json.loads(command("identify", record, "--json")) for record in (file, SAMPLE))
-    assert {**found, "start": None} == {**expected, "start": None}, "all but the name of the record"
-    polars.DataFrame(sample).write_parquet(file, compression="zstd")
-    assert "compressed by zstd; expected Snappy" in command.error("identify", file)
+    expected = json.loads(command("identify", SAMPLE, "--json"))
+    for compression in ("zstd", "snappy", "gzip", "uncompressed"):
+        polars.DataFrame(sample).write_parquet(file, compression=compression)
+        found = json.loads(command("identify", file, "--json"))
+        assert {**found, "start": None} == {**expected, "start": None}, "all but the name of the record"
+    polars.DataFrame(sample).write_parquet(file, compression="brotli")
+    assert "compressed by brotli; expected Snappy, zstd, gzip or none" in command.error("identify", file)
     stamped = polars.DataFrame(sample).with_columns(
         time=polars.datetime(2026, 1, 31) + polars.duration(milliseconds=polars.col("time_s") * 1000)
     )

@@ -3,6 +3,7 @@
 
 mod arrow;
 mod caught;
+mod compressed;
 pub(crate) mod mcap;
 mod messages;
 mod pages;

@@ -7,7 +7,7 @@ use anyhow::Result;
 use bytes::Bytes;
 use chrono::{DateTime, NaiveDate, NaiveTime, SecondsFormat, TimeDelta};
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -20,6 +20,7 @@ use simulation::record::columns::{Column, too_many_rows};
 use simulation::record::{Format, is_like_date, with_unit};
 
 use super::caught::caught;
+use super::compressed::{Codec, Pages};
 use super::{Cells, Columns, arrow, pages};
 
 /// Number of cells that are read at a time.
@@ -161,7 +162,7 @@ fn date(days: i64) -> Option<NaiveDate> {
 /// The first `rows` cells of a column, or what is wrong with it; `per_second` is given for one of durations.
 fn cells(
     file: &SerializedFileReader<Bytes>,
-    bytes: &[u8],
+    bytes: &Bytes,
     index: usize,
     per_second: Option<i64>,
     rows: usize,
@@ -177,7 +178,7 @@ fn cells(
             break;
         }
         check_pages(file, bytes, group, index)?;
-        let reader = file.get_row_group(group).and_then(|group| group.get_column_reader(index));
+        let reader = column_reader(file, bytes, group, index);
         let to = &mut cells;
         match reader.map_err(|error| unreadable(&error, to.len()))? {
             ColumnReader::BoolColumnReader(reader) => each(reader, most, rows, to, |it, to| to.whole((*it).into())),
@@ -201,6 +202,23 @@ fn cells(
         }?;
     }
     Ok(cells.0)
+}
+
+/// The values of a column in a group of rows.
+fn column_reader(
+    file: &SerializedFileReader<Bytes>,
+    bytes: &Bytes,
+    group: usize,
+    index: usize,
+) -> Result<ColumnReader, ParquetError> {
+    let rows = file.metadata().row_group(group);
+    match Codec::of(rows.column(index).compression()) {
+        None => file.get_row_group(group)?.get_column_reader(index),
+        Some(codec) => {
+            let pages = Pages::new(bytes, rows, index, codec)?;
+            Ok(get_column_reader(rows.column(index).column_descr_ptr(), Box::new(pages)))
+        }
+    }
 }
 
 /// Checks the sizes of the pages of a column in a group of rows.
@@ -231,7 +249,7 @@ fn unreadable(error: &ParquetError, row: usize) -> String {
     let text = error.to_string();
     // The name of a compression that is left out, which is another one.
     match text.rsplit_once("Disabled feature at compile time: ") {
-        Some((_, compression)) => format!("compressed by {compression}; expected Snappy, the usual one, or none"),
+        Some((_, compression)) => format!("compressed by {compression}; expected Snappy, zstd, gzip or none"),
         None => format!("after row {row}: {text}; expected a Parquet file"),
     }
 }
