@@ -1,14 +1,30 @@
 """The compiled part of the package."""
 
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any, Dict, List, Optional, Tuple, Union, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
-_Columns = List[Tuple[str, Union[_Floats, List[str]]]]
+_Columns = List[Tuple[str, Union[_Floats, NDArray[np.timedelta64], List[str]]]]
 _Records = List[Tuple[str, Optional[_Columns]]]
 _Plant = Union[str, Tuple[str, str]]
+
+__all__ = [
+    "BadInput",
+    "Controller",
+    "LinkError",
+    "PAGE_STYLE",
+    "Port",
+    "diagnose",
+    "identify",
+    "number",
+    "plan",
+    "predict",
+    "simulate",
+    "with_interval",
+    "with_unit",
+]
 
 PAGE_STYLE: str
 
@@ -18,6 +34,7 @@ class BadInput(ValueError):
 class LinkError(RuntimeError):
     """A request that the MCU refused or did not answer, as one line that names the port."""
 
+@final
 class Port:
     def __new__(cls, port: str, baud: int, timeout: float) -> "Port": ...
     def status(self) -> str: ...
@@ -50,6 +67,7 @@ def plan(
 def simulate(plant: _Plant, time_s: _Floats, voltage_v: _Floats, rate_hz: float) -> Tuple[_Floats, List[str]]: ...
 def predict(plant: _Plant, time_s: _Floats, voltage_v: _Floats, input: str) -> _Floats: ...
 
+@final
 class Controller:
     not_simulated: List[str]
     remarks: List[str]
