@@ -133,10 +133,10 @@ fn the_days_of_times_are_in_a_column_of_dates() {
 
 /// Files of pyarrow, which the writer here cannot make: two groups of rows, a dictionary, missing readings; `v2` are pages of version 2.
 const COMPRESSED: [(&str, &[u8]); 4] = [
-    ("zstd", include_bytes!("data/zstd.parquet")),
-    ("gzip", include_bytes!("data/gzip.parquet")),
-    ("zstd v2", include_bytes!("data/zstd-v2.parquet")),
-    ("gzip v2", include_bytes!("data/gzip-v2.parquet")),
+    ("zstd", include_bytes!("../../fuzz/corpus/parquet/zstd.parquet")),
+    ("gzip", include_bytes!("../../fuzz/corpus/parquet/gzip.parquet")),
+    ("zstd v2", include_bytes!("../../fuzz/corpus/parquet/zstd_v2.parquet")),
+    ("gzip v2", include_bytes!("../../fuzz/corpus/parquet/gzip_v2.parquet")),
 ];
 
 #[test]
@@ -154,11 +154,9 @@ fn columns_that_zstd_or_gzip_has_compressed_are_read() {
 
 #[test]
 fn every_damaged_file_is_an_error_in_one_line_or_a_remark() {
-    let rows: Vec<_> = (0..50).map(|row| (f64::from(row), 1.0, 2.0)).collect();
-    let written = BOTH.map(|container| (container, bytes(container, &RECORD, &record(&rows))));
-    // Each compression, and each version of pages.
-    let compressed = [COMPRESSED[0], COMPRESSED[3]].map(|(_, file)| (Container::Parquet, file.to_vec()));
-    for (container, whole) in written.into_iter().chain(compressed) {
+    for container in BOTH {
+        let rows: Vec<_> = (0..50).map(|row| (f64::from(row), 1.0, 2.0)).collect();
+        let whole = bytes(container, &RECORD, &record(&rows));
         let check = |bytes: Vec<u8>| match read("r", container, bytes, &Format::default(), None) {
             Ok(_) => (),
             Err(error) => {
