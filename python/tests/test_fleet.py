@@ -158,47 +158,52 @@ def test_ctrl_c_ends_the_run_also_where_python_drops_the_exception(copied, tmp_p
     assert "interrupted; at least 0 of 4 records are finished" in capsys.readouterr().err
 
 
-def test_workers_that_leave_for_good_end_the_run(folder, tmp_path, capsys):
-    out = tmp_path / "out"
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
-
-        def leave():
-            until(lambda: len(parts(out)) >= 3)
-            cluster.scale(0)
-
-        leaving = threading.Thread(target=leave)
-        leaving.start()
-        code = fleet.main([str(folder), "--out", str(out), "--scheduler", cluster.scheduler_address, "--batch", "1", "--wait", "2"])
-        leaving.join()
-    assert code == 1
-    line = capsys.readouterr().err.strip().splitlines()[-1]
-    assert re.fullmatch(r"vsj\.fleet: --scheduler tcp:.*: no worker for 2 s; expected one or more; at least \d+ of 36 records .*", line), line
-
-
-def test_after_a_killed_scheduler_the_next_run_goes_on(folder, tmp_path, engine, capsys):
-    file, out = tmp_path / "scheduler.json", tmp_path / "out"
+@pytest.fixture
+def programs(tmp_path):
+    """A scheduler and a worker as programs: the address, and a function that runs the fleet, kills one after three parts, and then all."""
+    file = tmp_path / "scheduler.json"
     start = lambda *words: subprocess.Popen([sys.executable, "-m", *words, "--scheduler-file", file], stderr=subprocess.DEVNULL)
     scheduler = start("distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard")
     worker = start("distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", "--death-timeout", "5")
+
+    def stop():
+        for it in (scheduler, worker):
+            it.kill()
+            it.wait()
+
     try:
         until(file.exists)
         address = json.loads(file.read_text())["address"]
 
-        def kill():
-            until(lambda: len(parts(out)) >= 3)
-            scheduler.kill()
+        def fleet_until_killed(victim, folder, out, *words):
+            def kill():
+                until(lambda: len(parts(out)) >= 3)
+                victim.kill()
 
-        killer = threading.Thread(target=kill)
-        killer.start()
-        code = fleet.main([str(folder), "--out", str(out), "--scheduler", address, "--batch", "2"])
-        killer.join()
-        assert code == 1
-        line = capsys.readouterr().err.strip().splitlines()[-1]
-        assert re.fullmatch(rf"vsj\.fleet: --scheduler {address}: .* lost; at least \d+ of 36 records are finished; .*", line), line
+            killer = threading.Thread(target=kill)
+            killer.start()
+            code = fleet.main([str(folder), "--out", str(out), "--scheduler", address, *words])
+            killer.join()
+            stop()
+            return code
+
+        yield types.SimpleNamespace(address=address, scheduler=scheduler, worker=worker, fleet_until_killed=fleet_until_killed)
     finally:
-        scheduler.kill()
-        worker.kill()
-        worker.wait()
+        stop()
+
+
+def test_workers_that_leave_for_good_end_the_run(folder, tmp_path, programs, capsys):
+    assert programs.fleet_until_killed(programs.worker, folder, tmp_path / "out", "--batch", "1", "--wait", "2") == 1
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    expected = rf"vsj\.fleet: --scheduler {programs.address}: no worker for 2 s; expected one or more; at least \d+ of 36 records .*"
+    assert re.fullmatch(expected, line), line
+
+
+def test_after_a_killed_scheduler_the_next_run_goes_on(folder, tmp_path, programs, engine, capsys):
+    out = tmp_path / "out"
+    assert programs.fleet_until_killed(programs.scheduler, folder, out, "--batch", "2") == 1
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert re.fullmatch(rf"vsj\.fleet: --scheduler {programs.address}: .* lost; at least \d+ of 36 records are finished; .*", line), line
     there = len(store.finished(out))
     assert 6 <= there < SPRINGS * RECORDS
     # Not even the size of the batches has to be the same.

@@ -12,7 +12,7 @@ from concurrent.futures import CancelledError
 from contextlib import contextmanager
 
 import numpy as np
-from distributed import KilledWorker, as_completed
+from distributed import KilledWorker, TimeoutError, as_completed
 from distributed.comm import CommClosedError
 
 from . import store, work
@@ -83,21 +83,44 @@ def interrupts():
         signal.signal(signal.SIGINT, before)
 
 
-def _ended(completed, client, wait_s):
-    """The futures of ``completed`` as they end; raises SchedulerLost after ``wait_s`` without a worker."""
-    seen = asked = time.monotonic()
-    while not completed.is_empty():
-        if completed.has_ready():
-            yield next(completed)
-            continue
-        time.sleep(_POLL_S)
+class _Workers:
+    """The workers, which may all leave for good."""
+
+    def __init__(self, client, wait_s):
+        self._client, self._wait_s = client, wait_s
+        self._asked = self._seen = time.monotonic()
+
+    def ended(self, completed):
+        """The futures of ``completed`` as they end."""
+        while not completed.is_empty():
+            if completed.has_ready():
+                self._seen = time.monotonic()
+                yield next(completed)
+            else:
+                time.sleep(_POLL_S)
+                self._expect()
+
+    def result(self, future):
+        """The result of a future that has ended: that of a worker which has left since is computed again."""
+        while True:
+            try:
+                return future.result(timeout=_ASK_S)
+            except TimeoutError:
+                # Not that of the work.
+                if future.status == "error":
+                    raise
+                self._expect()
+
+    def _expect(self):
+        """Raises SchedulerLost after the longest time without a worker."""
         now = time.monotonic()
-        if now - asked >= _ASK_S:
-            asked = now
-            if client.nthreads():
-                seen = now
-            elif now - seen >= wait_s:
-                raise SchedulerLost(f"no worker for {wait_s:g} s; expected one or more")
+        if now - self._asked < _ASK_S:
+            return
+        self._asked = now
+        if self._client.nthreads():
+            self._seen = now
+        elif now - self._seen >= self._wait_s:
+            raise SchedulerLost(f"no worker for {self._wait_s:g} s; expected one or more")
 
 
 def run(client, records, settings, plants, folder, out, batch_size, on_progress, wait_s):
@@ -145,6 +168,7 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress,
         return future
 
     in_progress, set_aside, following = {}, [], 0
+    workers = _Workers(client, wait_s)
     completed = as_completed()
 
     def fill():
@@ -159,10 +183,10 @@ def run(client, records, settings, plants, folder, out, batch_size, on_progress,
 
     try:
         fill()
-        for future in _ended(completed, client, wait_s):
+        for future in workers.ended(completed):
             start, rows, alone = in_progress.pop(future)
             try:
-                done = future.result()
+                done = workers.result(future)
             except KilledWorker:
                 if not alone:
                     set_aside += [(index, [row]) for index, row in enumerate(rows, start)]
