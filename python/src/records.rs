@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use identify::Input;
 use pyo3::prelude::*;
+use record_files::Container;
 use simulation::bad_input;
 use simulation::csv_table::Numbering;
 use simulation::csv_table::dialect::{Dialect, Separator};
@@ -30,6 +31,7 @@ pub(crate) struct Options {
     columns: Option<PathBuf>,
     separator: Option<String>,
     decimal: Option<String>,
+    topic: Option<String>,
     sort: bool,
     input: Option<String>,
 }
@@ -62,9 +64,17 @@ impl Options {
     /// # Errors
     /// [`simulation::BadInput`] with the record, line, column and what was expected.
     pub(crate) fn open(self, records: &[Owned]) -> Result<Records> {
+        let topic = self.topic.clone();
         let (format, input) = self.format()?;
         let read = |(name, columns): &Owned| match columns {
-            None => format.open(Path::new(name)),
+            None => {
+                let (path, mut format) = (Path::new(name), format.clone());
+                if Container::of(path).is_some() {
+                    // A file of options may be of CSV files too.
+                    format.dialect = Dialect::default();
+                }
+                record_files::open(path, &format, topic.as_deref())
+            }
             Some(columns) => {
                 let mut format = format.clone();
                 format.dialect.separator = Some(Separator::COMMA);

@@ -56,11 +56,32 @@ def test_polars_reads_what_the_command_writes(command, tmp_path):
     assert attributes["units"]["youngs_modulus_pa"] == "Pa"
 
 
-def test_paths_of_other_files_and_a_separator_of_a_frame_are_refused(sample):
-    for path, expected in (("a/run.Parquet", "the frame of pandas.read_parquet"), ("run.mcap", "the command vsj, which reads MCAP")):
-        with pytest.raises(vsj.BadInput) as error:
-            vsj.identify(path)
-        assert str(error.value) == f"{path}: the path of a record is that of a CSV file; expected {expected}"
+@pytest.mark.parametrize("ending", ["mcap", "parquet", "Parquet"])
+def test_the_path_of_another_file_is_read_as_by_the_command(command, tmp_path, ending):
+    file = tmp_path / f"stair.{ending}"
+    command("stair", "--out", file, "--every", "0.1")
+    found, expected = vsj.identify(file, voltage="applied_v"), command("identify", file, "--voltage", "applied_v", "--json")
+    assert json.loads(found.to_json()) == json.loads(expected)
+    file.write_bytes(b"time_s,voltage_v,stiffness")
     with pytest.raises(vsj.BadInput) as error:
-        vsj.identify(sample, separator=";")
-    assert str(error.value) == "separator: applies to paths of CSV files only; expected none"
+        vsj.identify(file)
+    assert str(error.value) == command.error("identify", file)
+
+
+def test_options_of_other_files_are_refused(command, sample, tmp_path):
+    file = tmp_path / "stair.mcap"
+    command("stair", "--out", file, "--every", "0.1")
+    for data, options, where in (
+        (sample, {"separator": ";"}, "CSV"),
+        (sample, {"topic": "/a"}, "MCAP"),
+        (file, {"separator": ";"}, "CSV"),
+        (tmp_path / "a.parquet", {"decimal": ","}, "CSV"),
+    ):
+        with pytest.raises(vsj.BadInput) as error:
+            vsj.identify(data, **options)
+        assert str(error.value) == f"{[*options][0]}: applies to paths of {where} files only; expected none"
+    for path in (file, SAMPLE):
+        with pytest.raises(vsj.BadInput) as error:
+            vsj.identify(path, topic="/nope")
+        assert str(error.value) == command.error("identify", path, "--topic", "/nope")
+    assert vsj.identify(file, topic="/stair", voltage="applied_v").nominal

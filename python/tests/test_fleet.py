@@ -362,6 +362,35 @@ def test_parquet_records_and_a_parquet_manifest_have_the_same_answers(copied, tm
         assert row["rmse"] == pytest.approx(expected.baseline.rmse, rel=1e-9)
 
 
+def test_a_parquet_file_has_the_bounds_of_the_command(tmp_path, engine, command):
+    folder, out = tmp_path / "springs", tmp_path / "out"
+    folder.mkdir()
+    number = np.arange(1_000_001.0)
+    pandas.DataFrame({"time_s": number, "voltage_v": 0.0, "stiffness": 0.0}).to_parquet(folder / "long.parquet")
+    with open(folder / "long.parquet", "r+b") as file:
+        # What a reader that begins with the cells would complain of.
+        file.seek(4)
+        file.write(bytes(1000))
+    assert fleet.main([str(folder), "--out", str(out), "--scheduler", engine]) == 1
+    [row] = rows_of(out).values()
+    assert row["error"] == command.error("diagnose", folder / "long.parquet") and "more than 1000000 rows" in row["error"]
+
+
+def test_an_mcap_file_is_a_record_beside_others(copied, tmp_path, engine, command):
+    folder, out = tmp_path / "springs", tmp_path / "out"
+    folder.mkdir()
+    for ending in ("mcap", "PARQUET"):
+        command("stair", "--out", folder / f"a.{ending}", "--every", "0.1")
+    pandas.read_parquet(folder / "a.PARQUET").to_csv(folder / "a.csv", index=False)
+    options = ["--voltage", "applied_v", "--topic", "/stair", "--separator", ","]
+    assert fleet.main([str(folder), "--out", str(out), "--scheduler", engine, "--effort", "quick", *options]) == 0
+    rows = rows_of(out)
+    assert len(rows) == 3
+    for record, row in rows.items():
+        expected = vsj.diagnose(folder / record, effort="quick", voltage="applied_v")
+        assert (row["spring"], row["verdict"], row["rmse"]) == ("a", expected.verdict, expected.baseline.rmse)
+
+
 @pytest.mark.parametrize("where", ["options", "file"])
 def test_separator_and_decimal_mark_are_those_of_the_csv_files(copied, tmp_path, engine, where):
     """One fleet may hold files of both kinds."""
@@ -460,7 +489,7 @@ def test_a_record_that_ends_its_workers_has_a_row_and_the_others_too(copied, tmp
 
 
 def no_options():
-    return dict.fromkeys(("time", "voltage", "reading", "column", "columns", "separator", "decimal", "input")) | {"sort": False}
+    return dict.fromkeys(("time", "voltage", "reading", "column", "columns", "separator", "decimal", "topic", "input")) | {"sort": False}
 
 
 def test_a_bounded_number_of_batches_is_in_progress(folder, tmp_path, engine, monkeypatch):
@@ -678,7 +707,7 @@ def test_files_that_are_no_records_are_counted(tmp_path):
     remarks = []
     _, table = records.listed(tmp_path, remark=remarks.append)
     assert table["record"].to_pylist() == ["a.CSV", "b.csv", "link.csv"]
-    assert remarks == ["2 of 5 files are no records: expected *.csv or *.parquet"]
+    assert remarks == ["2 of 5 files are no records: expected *.csv or *.mcap or *.parquet"]
 
 
 def test_units_of_a_parquet_file_are_those_of_the_command(copied, tmp_path, engine):

@@ -22,6 +22,7 @@ def identify(
     columns: Optional[Path] = None,
     separator: Optional[str] = None,
     decimal: Optional[str] = None,
+    topic: Optional[str] = None,
     sort: bool = False,
     input: Optional[str] = None,
 ) -> Identified:
@@ -30,9 +31,9 @@ def identify(
     Parameters
     ----------
     data : path, pandas or polars DataFrame, mapping, array, tuple, or a list of these
-        The record: the path of a CSV file, a frame or a mapping with named columns, a structured array, three arrays of shape
-        ``(n,)`` in the order time, voltage, reading, or an array of shape ``(n, 3)``. A list holds several records of one spring.
-        NaN or null is a missing reading.
+        The record: the path of a CSV, MCAP or Parquet file, a frame or a mapping with named columns, a structured array, three arrays
+        of shape ``(n,)`` in the order time, voltage, reading, or an array of shape ``(n, 3)``. A list holds several records of one
+        spring. NaN or null is a missing reading.
     time, voltage, reading : str, optional
         Column and unit, ``"NAME"`` or ``"NAME:UNIT"``, as of the command's options ``--time``, ``--voltage``, ``--reading``.
         Default: found by usual names and units.
@@ -42,6 +43,8 @@ def identify(
         File with these options as a table ``[columns]``.
     separator, decimal : str, optional
         Separator and decimal mark of a CSV file.
+    topic : str, optional
+        Topic of the messages in an MCAP file; default: the only one that has the columns.
     sort : bool
         Order the rows by time; rows at the same time become one.
     input : {"hold", "linear"}, optional
@@ -56,7 +59,7 @@ def identify(
     BadInput
         With record, line, column and what was expected.
     """
-    options = _options(time, voltage, reading, column, columns, separator, decimal, sort, input)
+    options = _options(time, voltage, reading, column, columns, separator, decimal, topic, sort, input)
     answer = _vsj.identify(given(data, options), options)
     warn(answer["remarks"])
     return Identified._of(answer["json"], plant=answer["plant"], courses=answer["courses"])
@@ -75,6 +78,7 @@ def diagnose(
     columns: Optional[Path] = None,
     separator: Optional[str] = None,
     decimal: Optional[str] = None,
+    topic: Optional[str] = None,
     sort: bool = False,
     input: Optional[str] = None,
 ) -> Diagnosis:
@@ -82,7 +86,7 @@ def diagnose(
 
     Parameters
     ----------
-    data, time, voltage, reading, column, columns, separator, decimal, sort
+    data, time, voltage, reading, column, columns, separator, decimal, topic, sort
         As for :func:`identify`.
     plant : str, path, Identified, Diagnosis or Spring
         The simulation to compare with: ``"paper"``, ``"identify"`` for what :func:`identify` finds in the records, a plant
@@ -105,7 +109,7 @@ def diagnose(
     KeyboardInterrupt
         At Ctrl-C, which ends the search.
     """
-    options = _options(time, voltage, reading, column, columns, separator, decimal, sort, input)
+    options = _options(time, voltage, reading, column, columns, separator, decimal, topic, sort, input)
     within = optional("within", within)
     answer = _vsj.diagnose(given(data, options), options, named_plant(plant), text("effort", effort), within)
     warn(answer["remarks"])
@@ -191,9 +195,9 @@ def optional(name, value):
     return None if value is None else number(name, value)
 
 
-def _options(time, voltage, reading, column, columns, separator, decimal, sort, input):
+def _options(time, voltage, reading, column, columns, separator, decimal, topic, sort, input):
     texts = dict(
-        time=time, voltage=voltage, reading=reading, column=column, separator=separator, decimal=decimal, input=input
+        time=time, voltage=voltage, reading=reading, column=column, separator=separator, decimal=decimal, topic=topic, input=input
     )
     for name, value in texts.items():
         if value is not None:

@@ -10,8 +10,8 @@ import numpy as np
 
 CONTRACT = ("time_s", "voltage_v", "stiffness")
 """Names of the columns of an array without names."""
-_READ_BY = {".parquet": "the frame of pandas.read_parquet", ".mcap": "the command vsj, which reads MCAP"}
-"""What takes the place of a path that is not that of a CSV file."""
+CONTAINERS = (".mcap", ".parquet")
+"""Endings of files other than CSV."""
 _MOST_DAYS = 2**63 // 86_400_000_000
 """Days that fit in NumPy's time in µs."""
 _LONGEST_S = 2**63 / 1e9
@@ -36,14 +36,16 @@ def warn(remarks):
 
 
 def _record(data, name, options):
-    if isinstance(data, (str, os.PathLike)):
-        path = os.fspath(data)
-        other = _READ_BY.get(os.path.splitext(path)[1].lower())
-        if other is not None:
-            raise bad_input(f"{path}: the path of a record is that of a CSV file; expected {other}")
+    path = os.fspath(data) if isinstance(data, (str, os.PathLike)) else None
+    if path is None or path.lower().endswith(CONTAINERS):
+        # The decimal mark is also that of a frame's texts.
+        for option in ("separator",) if path is None else ("separator", "decimal"):
+            if options.get(option) is not None:
+                raise bad_input(f"{option}: applies to paths of CSV files only; expected none")
+    if path is not None:
         return path, None
-    if options.get("separator") is not None:
-        raise bad_input("separator: applies to paths of CSV files only; expected none")
+    if options.get("topic") is not None:
+        raise bad_input("topic: applies to paths of MCAP files only; expected none")
     if type(data).__name__ == "LazyFrame":
         data = data.collect()
     if isinstance(data, Mapping):

@@ -20,7 +20,7 @@ Examples:
   python -m vsj.fleet data/springs --out out/fleet --scheduler slurm --workers 40
   python -m vsj.fleet --cost 1000000 --out out/fleet --cores 500 --price 0.04
 
-RECORDS is a folder with SPRING/DATE.csv, or .parquet, or a CSV or Parquet manifest with the columns record, and optionally
+RECORDS is a folder with SPRING/DATE.csv, .mcap or .parquet, or a CSV or Parquet manifest with the columns record, and optionally
 spring, time, plant. The same command goes on where an earlier one ended, however it ended. In --out: diagnoses.parquet, a row for
 each record; fleet.html, the summary; parts/, the state.
 
@@ -108,7 +108,7 @@ def _progress(outcome, count):
 
 def _settings(wanted, table, folder):
     """The settings, and the text of each plant by its name."""
-    options = {name: getattr(wanted, name) for name in ("time", "voltage", "reading", "column", "separator", "decimal", "sort", "input")}
+    options = {name: getattr(wanted, name) for name in ("time", "voltage", "reading", "column", "separator", "decimal", "topic", "sort", "input")}
     columns = _text(wanted.columns, "--columns") if wanted.columns else None
     plants = dict.fromkeys(NAMED_PLANTS)
     if wanted.plant not in plants:
@@ -238,6 +238,7 @@ def _parser():
     add("--columns", metavar="FILE", help="file with these options")
     add("--separator", metavar="CHAR", help="separator of CSV files")
     add("--decimal", metavar="CHAR", help="decimal mark of CSV files")
+    add("--topic", metavar="NAME", help="topic of the messages in MCAP files")
     add("--sort", action="store_true", help="order the rows by time")
     add("--input", choices=("hold", "linear", "stair"), help="the voltage between the rows; default: hold")
     paper = parser.add_argument_group("cost of a larger fleet, computed from the results in --out")

@@ -14,6 +14,7 @@ import pyarrow as pa
 from pyarrow import compute, csv, parquet
 
 from .. import BadInput
+from ..records import CONTAINERS
 
 SCHEMA = pa.schema(
     [
@@ -25,8 +26,9 @@ SCHEMA = pa.schema(
 )
 """Columns of a table of records; ``record`` is relative to the folder. ``time`` and ``plant`` may be null."""
 
-ENDINGS = (".csv", ".parquet")
+ENDINGS = (".csv", *CONTAINERS)
 """Endings of the files that are records, in lower or upper case."""
+_EXPECTED = " or ".join("*" + it for it in ENDINGS)
 
 _DATE = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)(?:[T_ ](\d\d)[-:]?(\d\d)(?:[-:]?(\d\d)(?:\.(\d{1,6}))?)?)?(Z|[+-]\d\d:?\d\d)?(?!\d)"
@@ -66,11 +68,6 @@ def reason(error):
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def is_parquet(path):
-    """True for the name of a Parquet file."""
-    return str(path).lower().endswith(".parquet")
-
-
 def listed(url, results=(), remark=lambda text: None):
     """The records in a folder or a manifest, and the address of the folder that their names are relative to.
 
@@ -86,7 +83,7 @@ def listed(url, results=(), remark=lambda text: None):
         else:
             raise BadInput(f"{url}: not found; expected a folder of records, or a manifest")
     if table.num_rows == 0:
-        raise BadInput(f"{url}: no record; expected files {' or '.join('*' + it for it in ENDINGS)}, one or more")
+        raise BadInput(f"{url}: no record; expected files {_EXPECTED}, one or more")
     table = table.sort_by([("spring", "ascending"), ("time", "ascending"), ("record", "ascending")])
     twice = compute.value_counts(table["record"])
     twice = twice.filter(compute.greater(twice.field("counts"), 1))
@@ -132,7 +129,7 @@ def _folder(fs, path, results, remark):
     is_file = lambda name: seen[name]["type"] == "file" or fs.isfile(name)
     names = [name for name in seen if name.lower().endswith(ENDINGS) and is_file(name)]
     if names and len(names) < len(seen):
-        remark(f"{len(seen) - len(names)} of {len(seen)} files are no records: expected {' or '.join('*' + it for it in ENDINGS)}")
+        remark(f"{len(seen) - len(names)} of {len(seen)} files are no records: expected {_EXPECTED}")
     relative = [posixpath.relpath(name, path) for name in names]
     stems = [posixpath.splitext(posixpath.basename(name))[0] for name in relative]
     springs = [posixpath.dirname(name) or stem for name, stem in zip(relative, stems)]
@@ -143,7 +140,7 @@ def _folder(fs, path, results, remark):
 def _manifest(fs, path, url):
     """The records that a CSV or Parquet file lists: ``record``, and optionally ``spring``, ``time`` and ``plant``."""
     with readable(url, "a manifest"), fs.open(path, "rb") as file:
-        if is_parquet(path):
+        if path.lower().endswith(".parquet"):
             table = parquet.read_table(file)
         else:
             texts = csv.ConvertOptions(

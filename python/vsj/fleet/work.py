@@ -11,11 +11,8 @@ import posixpath
 import tempfile
 import time
 
-from pyarrow import parquet
-
 from .. import BadInput, __version__, _vsj
-from ..records import given
-from .records import filesystem, is_parquet, readable
+from .records import filesystem
 from .settings import build
 from .store import write_part
 
@@ -120,7 +117,10 @@ def _answer(path, settings, plant, scratch):
         with open(columns, "w", encoding="utf-8") as file:
             file.write(settings.columns)
         options = options | {"columns": columns}
-    measured = [(path, _columns(path))]
+    if not path.lower().endswith(".mcap"):
+        # One fleet may hold files of all kinds.
+        options = options | {"topic": None}
+    measured = [(path, None)]
     answer = _vsj.diagnose(measured, options, plant, settings.effort, None)
     found = json.loads(answer["json"])
     return {
@@ -159,12 +159,3 @@ def _identified(measured, options):
         quantities.append(_quantity("tau_s", max(nominal["tau_s"], key=lambda it: abs(it["weight"]["value"]))))
     return quantities
 
-
-def _columns(path):
-    """The columns of a Parquet file; ``None`` for a text file, which the library reads itself."""
-    if not is_parquet(path):
-        return None
-    with readable(path, "Parquet"):
-        table = parquet.read_table(path)
-    [(_, columns)] = given(table, {})
-    return columns
