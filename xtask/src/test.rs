@@ -59,6 +59,9 @@ const LANES: Lanes = Lanes {
         Step::emulation("size", &["size", "--feedback", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("boot", &["boot"]),
         Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
+        // Bounds on what the bank adds to the tick, and each controller for each kind of spring.
+        Step::emulation("cost bank", &["emulate", "--isolation"]),
+        Step::emulation("cost ticks", &["emulate", "--blocks"]),
         Step::emulation("clients", &["clients"]),
         Step::emulation("c library", &["capi"]),
     ],
