@@ -54,15 +54,17 @@ fn without_a_sensor_every_spring_is_within_a_tenth_of_the_bound() {
     let file = PlantFile::from(settings(Compensation::None, None).plant);
     let allowed = Allowed { amplifier: Amplifier::up_to(1000.0), overshoot: OVERSHOOT };
     let bound = RobustBound::new(&file, allowed).unwrap();
-    for (time_constant, share) in [(0.0, 0.1), (0.05, 0.05)] {
-        let margin = Margin { time_constant, share, gain: 0.0, overshoot: OVERSHOOT };
+    for (time_constant, share, gain) in
+        [(0.0, 0.1, 0.0), (0.05, 0.05, 0.0), (0.02, 0.02, 0.01), (0.0, 0.0, 0.01), (0.02, 0.0, 0.01)]
+    {
+        let margin = Margin { time_constant, share, gain, overshoot: OVERSHOOT };
         let settings = settings(Compensation::Robust(margin), None);
-        for (from, to) in [(0.0, 100.0), (400.0, 500.0)] {
+        for (from, to) in [(0.0, 100.0), (400.0, 500.0), (500.0, 400.0)] {
             let each = springs(&margin)
                 .into_iter()
                 .map(|spring| last_step(&settings, &spring, &[(from, 100.0), (to, 12.0)], None));
             let (late_s, overshoot) = each.fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
-            let errors = SpringError { time_constant, share, gain: 0.0 };
+            let errors = SpringError { time_constant, share, gain };
             let shortest_s = bound.shortest_s(from, to, &errors).unwrap();
             println!("{margin:?} {from} V: {late_s} s of {shortest_s:.3} s, {:.2} %", 100.0 * overshoot);
             assert!(late_s <= 1.1 * shortest_s, "{margin:?} {from} V: {late_s} s, bound {shortest_s} s");
