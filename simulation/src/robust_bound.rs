@@ -15,18 +15,21 @@
 //! spring, the likeliest one, has to be at 97 % in its own shortest time, and to stay there.
 
 mod answer;
+mod apart;
 mod linear;
+mod programme;
 
 use anyhow::Result;
-use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
 use model::Amplifier;
 
 use crate::bad_input;
 use crate::plant_file::PlantFile;
 use crate::spring_error::{DifferingSpring, Parameter, SpringError};
 use linear::Linear;
+use programme::Member;
 
 pub use answer::{Answer, Needed, OF_KNOWN, Question, Step, answer};
+pub use apart::{Apart, Response};
 
 /// First and longest interval until the time that is tried, as parts of it.
 const BEFORE: (f64, f64) = (1.0 / 2400.0, 1.0 / 120.0);
@@ -40,10 +43,6 @@ const HORIZON: f64 = 2.0;
 const RESOLUTION: (f64, f64) = (0.01, 1e-4);
 /// Part of a step that counts as reached.
 const REACHED: f64 = 0.97;
-/// Weights of voltages in the stiffness below this are left out of the programme.
-const NEGLIGIBLE: f64 = 1e-9;
-/// Largest violation that counts as none, relative to the step.
-const TOLERANCE: f64 = 1e-6;
 /// Largest error of a parameter that is tried, and the resolution of [`RobustBound::needed`].
 const LARGEST_ERROR: (f64, f64) = (0.25, 1e-3);
 
@@ -178,54 +177,22 @@ impl<'a> RobustBound<'a> {
         let Allowed { amplifier, overshoot } = self.allowed;
         let (intervals_s, before) = self.intervals_s(time_s);
         let step = to_v - from_v;
-        let mut problem = Problem::new(OptimizationDirection::Minimize);
         // Voltages relative to the old one, in steps, so that the programme is dimensionless.
         let range = ((amplifier.min_v - from_v) / step, (amplifier.max_v - from_v) / step);
         let range = (range.0.min(range.1), range.0.max(range.1));
-        let voltages: Vec<_> = (0..=intervals_s.len()).map(|_| problem.add_var(0.0, range)).collect();
-        // Not below 0: by how much less than all that is allowed is needed does not matter, and takes the solver long.
-        let violation = problem.add_var(1.0, (0.0, f64::INFINITY));
-        let mut at_most = |weights: &[f64], sign: f64, limit: f64| {
-            let mut sum = LinearExpr::empty();
-            for (voltage, weight) in voltages.iter().zip(weights).filter(|(_, weight)| weight.abs() > NEGLIGIBLE) {
-                sum.add(*voltage, sign * weight);
-            }
-            sum.add(violation, -1.0);
-            problem.add_constraint(sum, ComparisonOp::Le, limit);
-        };
+        let slew_per_s = amplifier.slew_v_per_s.map(|slew| slew / step.abs());
         let nominal_from = intervals_s
             .iter()
             .scan(0.0, |passed_s, interval_s| Some(std::mem::replace(passed_s, *passed_s + interval_s)))
             .take_while(|passed_s| *passed_s < nominal_s)
             .count();
-        for (number, spring) in springs.iter().enumerate() {
+        let member = |(number, spring): (usize, &Linear)| {
             let from = if number + 1 == springs.len() { before.min(nominal_from) } else { before };
-            for (at, weights) in spring.responses(&intervals_s).iter().enumerate() {
-                at_most(weights, 1.0, 1.0 + overshoot);
-                if at >= from {
-                    at_most(weights, -1.0, -REACHED);
-                }
-            }
-        }
-        if let Some(slew) = amplifier.slew_v_per_s {
-            // The old voltage, 0, before the first.
-            let changes =
-                std::iter::once((None, voltages[0])).chain(voltages.windows(2).map(|of| (Some(of[0]), of[1])));
-            for ((last, voltage), interval_s) in changes.zip(std::iter::once(&0.0).chain(&intervals_s)) {
-                for sign in [1.0, -1.0] {
-                    let mut change = LinearExpr::empty();
-                    change.add(voltage, sign);
-                    if let Some(last) = last {
-                        change.add(last, -sign);
-                    }
-                    problem.add_constraint(change, ComparisonOp::Le, slew * interval_s / step.abs());
-                }
-            }
-        }
-        match problem.solve() {
-            Ok(SolveOutcome::Solution(solution)) => solution.objective() <= TOLERANCE,
-            _ => false,
-        }
+            let weights = spring.responses(&intervals_s);
+            Member { held: vec![0.0; weights.len()], weights, range, slew_per_s, from }
+        };
+        let members: Vec<Member> = springs.iter().enumerate().map(member).collect();
+        programme::is_possible(&intervals_s, usize::MAX, &members, overshoot)
     }
 }
 

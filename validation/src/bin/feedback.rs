@@ -33,6 +33,13 @@ For a spring that is known to within 10 % of time constant, share and gain, with
 upward stays above 97 % after 0.6 s, or after 1.05 times the shortest possible time, that of the same spring under 1000 V, and
 overshoots by at most 2 %. A step that no voltage completes is impossible.
 
+The shortest possible time is that of a controller that knows the spring and does not care what follows. The bound is the time in which a
+controller with the sensor can have both at 97 %, the paper's spring and the one with the effect, and keep both between 97 and 102 %: with
+one voltage until a reading tells them apart by 2 standard deviations, which it does under full voltage, and then with one for each; in
+later steps the readings of 30 s have told them apart. It is found by the linear programme of `vsj bound`. Steps with a bound above what is
+required are forbidden by physics; the others that are not in time a better controller could make, if it had no other effects to expect.
+Effects of the readings are none of the spring: their bound is that of the paper's spring. A sensor that sticks does so in the first step.
+
 The sensor is rated for 0.1 s at rest first, as on the MCU before the output is enabled. The voltage rises by 20 V in a millisecond, and
 readings that show a spring ahead of its model correct it without delay, so that a larger share, gain or law is seen before the target is
 passed. Where the requirement is not met:

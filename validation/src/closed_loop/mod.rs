@@ -10,9 +10,11 @@
 //! | [`scenario`] | one run of the loop, tick by tick |
 //! | [`effects`] | every effect, with a sensor and without |
 //! | [`requirement`] | each step within 0.6 s, or as fast as the spring can be, with little overshoot |
+//! | [`bound`] | the time in which any controller with the sensor can make a step |
 //! | [`sensor_failure`] | a sensor that fails and recovers |
 //! | [`tables`] | results as Markdown |
 
+pub mod bound;
 pub mod effects;
 pub mod requirement;
 pub mod scenario;

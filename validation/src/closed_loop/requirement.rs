@@ -2,17 +2,19 @@
 //! of overshoot.
 //!
 //! The shortest possible time is that of the same spring, from the state in which the step begins, under the amplifier's full voltage: no
-//! other voltage is at 97 % earlier.
+//! other voltage is at 97 % earlier. The bound is the time in which a controller with the sensor can be at 97 % and stay there ([`bound`]).
 
 use std::ops::Range;
 
 use model::{OutOfRange, Settings};
 use rayon::prelude::*;
 
+use super::bound;
 use super::scenario::{Scenario, fresh};
 use super::stair::{self, HOLD_S, LEVELS_V};
 use crate::criterion::Criterion;
 use crate::ground_truth::{Cause, Live};
+use crate::isolation::Fault;
 use crate::markdown::table;
 
 /// Time in which a step has to reach 97 %, in s.
@@ -27,12 +29,16 @@ pub const OVERSHOOT_PERCENT: f64 = 2.0;
 /// One effect over all its seeds and all steps upward, with a sensor.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Cause of the effect; `None` for the paper's spring.
-    pub cause: Option<Cause>,
+    /// The effect.
+    pub fault: Fault,
     /// Of the steps that a voltage can bring to 97 %, the one that exceeds what is allowed by most.
     pub slowest: Step,
+    /// Time in which a controller can be at 97 % of that step and stay there, in s; `None` if that is too long to be computed.
+    pub bound_s: Option<f64>,
     /// Steps that keep the time, those that a voltage can bring to 97 %, and all.
     pub in_time: [usize; 3],
+    /// Of the steps that a voltage can bring to 97 %, those for which the bound is longer than the time that is allowed.
+    pub forbidden: usize,
     /// Largest overshoot, in percent of the step.
     pub overshoot_percent: f64,
 }
@@ -58,52 +64,63 @@ impl Step {
 /// # Errors
 /// The model rejects the settings.
 pub fn all(settings: &Settings, seeds: u64, first_seed: u64) -> Result<Vec<Outcome>, OutOfRange> {
-    let causes: Vec<_> = std::iter::once(None).chain(Cause::ALL.map(Some)).collect();
-    causes.par_iter().map(|&cause| one(settings, cause, first_seed..first_seed + seeds)).collect()
+    let effects = Cause::ALL.map(Fault::Effect);
+    let faults: Vec<_> = std::iter::once(Fault::None).chain(effects).chain([Fault::Stuck]).collect();
+    faults.par_iter().map(|&fault| one(settings, fault, first_seed..first_seed + seeds)).collect()
 }
 
-fn one(settings: &Settings, cause: Option<Cause>, seeds: Range<u64>) -> Result<Outcome, OutOfRange> {
+fn one(settings: &Settings, fault: Fault, seeds: Range<u64>) -> Result<Outcome, OutOfRange> {
     let (mut steps, mut overshoot_percent) = (Vec::new(), 0.0);
     for seed in seeds {
-        let scenario = cause.map_or_else(|| Scenario::nothing(seed), |cause| Scenario::of(cause, seed));
+        let scenario = match fault {
+            Fault::Effect(cause) => Scenario::of(cause, seed),
+            Fault::None | Fault::Stuck => Scenario::nothing(seed),
+        };
         let ticks = (HOLD_S * settings.rate_hz).round() as usize;
-        let mut shortest = Vec::new();
+        let mut begun = Vec::new();
+        let mut last = 0.0;
         let run = scenario.run_watched(
             settings,
             REST_TICKS,
-            |_, read| fresh(read),
+            |tick, read| {
+                // The sensor sticks in the first step.
+                if fault != Fault::Stuck || tick == 0 {
+                    last = read;
+                }
+                fresh(last)
+            },
             |tick, live| {
                 if tick % ticks == 0 {
-                    let (from, to) = heights(tick / ticks);
-                    shortest.push(shortest_s(
-                        live,
-                        settings.amplifier.max_v,
-                        from + 0.97 * (to - from),
-                        settings.rate_hz,
-                    ));
+                    begun.push(live.clone());
                 }
             },
         )?;
         let truth: Vec<f64> = run.iter().map(|sample| sample.truth).collect();
-        for (number, (part, shortest_s)) in truth.chunks(ticks).zip(shortest).enumerate() {
+        for (number, (part, live)) in truth.chunks(ticks).zip(begun).enumerate() {
             let (from, to) = heights(number);
             if to > from {
                 let reached = |y: &f64| (y - from) / (to - from) >= 0.97;
                 let late = part.iter().rposition(|y| !reached(y)).map_or(0, |tick| tick + 1);
                 let t97_s = if late == part.len() { f64::INFINITY } else { late as f64 / settings.rate_hz };
-                steps.push(Step { t97_s, shortest_s });
+                let full_v = settings.amplifier.max_v;
+                let shortest_s = shortest_s(&live, full_v, from + 0.97 * (to - from), settings.rate_hz);
+                let bound =
+                    bound::Step { live, effects: scenario.effects.clone(), noise_v: scenario.noise.sigma_v, from, to };
+                steps.push((Step { t97_s, shortest_s }, bound));
             }
         }
         let up = stair::steps(&truth, settings.rate_hz).into_iter().filter(|step| step.up);
         overshoot_percent = up.map(|step| step.overshoot_percent).fold(overshoot_percent, f64::max);
     }
     let late = |step: &Step| if step.t97_s.is_infinite() { f64::INFINITY } else { step.t97_s / step.allowed_s() };
-    let possible = || steps.iter().filter(|step| step.shortest_s.is_finite());
-    let slowest = possible().copied().max_by(|a, b| late(a).total_cmp(&late(b)));
-    let slowest = slowest.unwrap_or(Step { t97_s: f64::INFINITY, shortest_s: f64::INFINITY });
-    let kept = possible().filter(|step| step.t97_s <= step.allowed_s()).count();
+    let possible = || steps.iter().filter(|(step, _)| step.shortest_s.is_finite());
+    let slowest = possible().max_by(|(a, _), (b, _)| late(a).total_cmp(&late(b)));
+    let bound_s = slowest.and_then(|(step, bound)| bound.shortest_s(step.shortest_s, settings));
+    let slowest = slowest.map_or(Step { t97_s: f64::INFINITY, shortest_s: f64::INFINITY }, |(step, _)| *step);
+    let kept = possible().filter(|(step, _)| step.t97_s <= step.allowed_s()).count();
+    let forbidden = possible().filter(|(step, bound)| !bound.is_possible(step.allowed_s(), settings)).count();
     let in_time = [kept, possible().count(), steps.len()];
-    Ok(Outcome { cause, slowest, in_time, overshoot_percent })
+    Ok(Outcome { fault, slowest, bound_s, in_time, forbidden, overshoot_percent })
 }
 
 /// Targets before and after the step with this number, in V.
@@ -129,10 +146,12 @@ pub fn page(outcomes: &[Outcome]) -> String {
     let time = |time_s: f64| if time_s.is_finite() { format!("{time_s:.3}") } else { "-".to_owned() };
     let row = |it: &Outcome| {
         vec![
-            it.cause.map_or("none", Cause::name).to_owned(),
+            it.fault.name().to_owned(),
             time(it.slowest.t97_s),
             time(it.slowest.shortest_s),
+            it.bound_s.map_or_else(|| format!("> {}", bound::LONGEST_S), time),
             format!("{} of {}", it.in_time[0], it.in_time[1]),
+            it.forbidden.to_string(),
             (it.in_time[2] - it.in_time[1]).to_string(),
             format!("{:.1}", it.overshoot_percent),
         ]
@@ -141,7 +160,9 @@ pub fn page(outcomes: &[Outcome]) -> String {
         "effect",
         "t97 of the slowest step [s]",
         "shortest possible [s]",
+        "bound [s]",
         "steps in time",
+        "forbidden",
         "impossible",
         "overshoot [%]",
     ];
@@ -151,7 +172,7 @@ pub fn page(outcomes: &[Outcome]) -> String {
 /// Both criteria of each effect.
 pub fn criteria(controller: &str, outcomes: &[Outcome]) -> Vec<Criterion> {
     let of = |it: &Outcome| {
-        let name = it.cause.map_or("none", Cause::name);
+        let name = it.fault.name();
         let (time, overshoot) =
             (format!("{controller}, {name}: t97 [s]"), format!("{controller}, {name}: overshoot [%]"));
         let allowed_s = (it.slowest.allowed_s() * 1000.0).round() / 1000.0;
@@ -181,17 +202,19 @@ mod tests {
     /// The last step of the paper's spring from 400 to 500 V takes 0.446 s, and is the slowest.
     #[test]
     fn the_papers_spring_meets_the_requirement_at_the_shortest_possible_time() {
-        let Outcome { slowest, in_time, overshoot_percent, .. } = one(&robust(), None, 1..2).unwrap();
+        let Outcome { slowest, bound_s, in_time, forbidden, overshoot_percent, .. } =
+            one(&robust(), Fault::None, 1..2).unwrap();
+        assert!(forbidden == 0 && (bound_s.unwrap() - slowest.shortest_s).abs() < 0.03, "{forbidden} {bound_s:?}");
         assert!((slowest.shortest_s - 0.446).abs() < 0.003, "{slowest:?}");
         assert!(slowest.t97_s >= slowest.shortest_s && slowest.t97_s < 1.05 * slowest.shortest_s, "{slowest:?}");
         assert!(in_time == [5, 5, 5] && overshoot_percent < OVERSHOOT_PERCENT, "{in_time:?} {overshoot_percent}");
-        assert!(criteria("it", &[one(&robust(), None, 1..2).unwrap()]).iter().all(Criterion::is_met));
+        assert!(criteria("it", &[one(&robust(), Fault::None, 1..2).unwrap()]).iter().all(Criterion::is_met));
     }
 
     /// An amplifier that stops short of 500 V cannot bring the spring there.
     #[test]
     fn a_step_that_no_voltage_completes_is_impossible() {
-        let [kept, possible, all] = one(&robust(), Some(Cause::AmplifierLimit), 1..2).unwrap().in_time;
+        let [kept, possible, all] = one(&robust(), Fault::Effect(Cause::AmplifierLimit), 1..2).unwrap().in_time;
         assert!(kept <= possible && possible < 5 && all == 5, "{kept} {possible}");
     }
 
@@ -199,8 +222,14 @@ mod tests {
     #[test]
     fn a_step_that_is_late_or_overshoots_does_not_meet_the_requirement() {
         let late = Step { t97_s: 0.7, shortest_s: 0.5 };
-        let outcome =
-            |slowest, overshoot_percent| Outcome { cause: None, slowest, in_time: [4, 5, 5], overshoot_percent };
+        let outcome = |slowest, overshoot_percent| Outcome {
+            fault: Fault::None,
+            slowest,
+            bound_s: None,
+            in_time: [4, 5, 5],
+            forbidden: 0,
+            overshoot_percent,
+        };
         let met = |outcome| criteria("it", &[outcome]).iter().map(Criterion::is_met).collect::<Vec<_>>();
         assert_eq!(met(outcome(late, 2.5)), [false, false]);
         assert_eq!(met(outcome(Step { shortest_s: 0.67, ..late }, 2.0)), [true, true]);
