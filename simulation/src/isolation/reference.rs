@@ -336,11 +336,29 @@ impl Bank {
         self.pinned_at = None;
     }
 
-    fn decide(&mut self) {
-        let n = f64::from(self.blocks);
+    /// Restarts the sums as if a fault began with the present block, and lets them go on until the end.
+    pub fn start(&mut self) {
+        self.restart();
+        self.alarmed = true;
+    }
+
+    /// True if the innovations since [`Bank::start`], taken as free of noise, exclude every cause but `cause` and those that contain it: by the
+    /// naming rule each leaves so much that what the signature of `cause` leaves is no matter.
+    pub fn excludes_others(&self, cause: Cause) -> bool {
+        let bar = 2.0 * self.settings.margin_nats + self.unexplained() / f64::from(1 << thresholds::RIVAL_ERROR_BITS);
+        let is_other = |other: Cause| other != cause && !NESTED.contains(&(cause, other));
+        self.fits().into_iter().all(|(other, left, _)| !is_other(other) || left >= bar)
+    }
+
+    /// Returns what the nuisance alone leaves.
+    fn unexplained(&self) -> f64 {
         // The hypothesis of a gain alone, without its last step.
         let gain = &self.products[0];
-        self.none = gain[2][2] - if gain[0][0] > 0.0 { gain[0][2].powi(2) / gain[0][0] } else { 0.0 };
+        gain[2][2] - if gain[0][0] > 0.0 { gain[0][2].powi(2) / gain[0][0] } else { 0.0 }
+    }
+
+    /// Returns what the best hypothesis of each cause leaves, and its size with its standard deviation.
+    fn fits(&self) -> Vec<(Cause, f64, (f64, f64))> {
         let mut best: Vec<(Cause, f64, (f64, f64))> = Vec::new();
         for (products, hypothesis) in self.products.iter().zip(HYPOTHESES) {
             let (leftover, size, information) = fit(products);
@@ -355,6 +373,13 @@ impl Bank {
                 None => best.push((hypothesis.cause, leftover, size)),
             }
         }
+        best
+    }
+
+    fn decide(&mut self) {
+        let n = f64::from(self.blocks);
+        self.none = self.unexplained();
+        let mut best = self.fits();
         best.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (cause, least, _) = best[0];
         self.rounds += 1;

@@ -1,12 +1,16 @@
 //! Time between false alarms: counted at low thresholds, computed by importance sampling at the bank's own.
 
-use model::isolation::{Tolerance, Verdict, bank, thresholds};
+use std::ops::Range;
+
+use model::isolation::{Verdict, bank, thresholds};
 use model::{OutOfRange, Volts};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::known;
+use super::run::Known;
 use super::watched::Watched;
 
 /// Alarms of springs without a fault.
@@ -18,15 +22,33 @@ pub struct Alarms {
     pub alarms: u64,
 }
 
-/// Counts the alarms at a threshold in runs of 500 s without a fault, one for each seed.
-///
-/// # Errors
-/// The model rejects the settings.
-pub fn count(percent: f64, nats: f64, seeds: std::ops::Range<u64>) -> Result<Alarms, OutOfRange> {
-    const TICKS: u32 = 500_000;
-    let one = |seed: u64| {
+/// A bank that watches springs without a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Watch {
+    /// Standard deviation of the noise, in percent of 500 V.
+    pub percent: f64,
+    /// Relative errors of time constant, share and gain that are tolerated. Those of each spring are within it, each value as likely.
+    pub tolerated: f64,
+    /// Threshold of the sequential tests.
+    pub nats: f64,
+}
+
+impl Watch {
+    /// Counts the alarms in runs of 500 s without a fault, one for each seed.
+    ///
+    /// # Errors
+    /// The model rejects the settings.
+    pub fn count(&self, seeds: Range<u64>) -> Result<Alarms, OutOfRange> {
+        let sum = |a: Alarms, b: Alarms| Alarms { ticks: a.ticks + b.ticks, alarms: a.alarms + b.alarms };
+        seeds.into_par_iter().map(|seed| self.one(seed)).try_reduce(Alarms::default, |a, b| Ok(sum(a, b)))
+    }
+
+    fn one(&self, seed: u64) -> Result<Alarms, OutOfRange> {
+        const TICKS: u32 = 500_000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut watched = Watched::new(percent, nats, Tolerance::NONE, seed, TICKS)?;
+        let Known { errors, tolerance } = known::within(self.tolerated, seed);
+        let mut watched = Watched::new(self.percent, self.nats, tolerance, seed, TICKS)?;
+        watched.change(&errors);
         let (mut target, mut until, mut alarms) = (Volts::ZERO, 0, 0);
         for tick in 0..TICKS {
             if tick == until {
@@ -40,9 +62,7 @@ pub fn count(percent: f64, nats: f64, seeds: std::ops::Range<u64>) -> Result<Ala
             }
         }
         Ok(Alarms { ticks: u64::from(TICKS), alarms })
-    };
-    let sum = |a: Alarms, b: Alarms| Alarms { ticks: a.ticks + b.ticks, alarms: a.alarms + b.alarms };
-    seeds.into_par_iter().map(one).try_reduce(Alarms::default, |a, b| Ok(sum(a, b)))
+    }
 }
 
 /// False alarms per block at a threshold, by importance sampling: the largest rate of a test over constant signatures of 0.05 to 5
@@ -102,6 +122,8 @@ fn rate(
 
 #[cfg(test)]
 mod tests {
+    use model::isolation::Tolerance;
+
     use super::*;
 
     /// Lorden's bound: the mean time to an alarm is at least exp(h) blocks, for each test.
@@ -111,5 +133,19 @@ mod tests {
         let [low, high] = [6.0, 12.0].map(|nats| predicted_per_block(nats, 2000));
         assert!(low < tests * f64::exp(-6.0) && low > 0.01 * f64::exp(-6.0), "{low}");
         assert!(high < tests * f64::exp(-12.0) && high > 0.01 * f64::exp(-12.0), "{high}");
+    }
+
+    /// Without an error a quiet run; an error is an alarm unless it is tolerated.
+    #[test]
+    fn a_spring_within_its_tolerance_raises_no_alarm() {
+        let alarms = |tolerated| Watch { percent: 0.2, tolerated, nats: 20.0 }.count(1..2).unwrap().alarms;
+        assert_eq!([0.0, 0.005].map(alarms), [0, 0]);
+        let errors = known::within(0.005, 1).errors;
+        let mut watched = Watched::new(0.2, 20.0, Tolerance::NONE, 1, 100_000).unwrap();
+        watched.change(&errors);
+        for tick in 0..100_000 {
+            watched.tick(Volts::new(if tick / 10_000 % 2 == 0 { 300.0 } else { 0.0 }).unwrap()).unwrap();
+        }
+        assert_ne!(watched.verdict(), Verdict::Quiet, "{errors:?}");
     }
 }

@@ -1,8 +1,10 @@
 //! The faults of the tables, and their sizes.
 
+use model::isolation;
 use rand_chacha::ChaCha8Rng;
 
 use crate::closed_loop::stair;
+use crate::ground_truth::physics::{FULL_V, SHARE, TAU_S};
 use crate::ground_truth::{Cause, Effect};
 
 /// Sizes of the faults, as fractions of full size.
@@ -27,6 +29,38 @@ impl Fault {
         known.chain([Self::Stuck]).chain(unknown).collect()
     }
 
+    /// The cause of the bank that this is; `None` if it has no signature of it.
+    pub fn cause(self) -> Option<isolation::Cause> {
+        isolation::Cause::named(self.name())
+    }
+
+    /// Size of its effect in the unit of the bank's cause ([`isolation::Cause::unit`]), for a bank of this range in V; `None` for a cause
+    /// that has no other size than 1.
+    pub fn size(self, effect: &Effect, range_v: f64) -> Option<f64> {
+        match (self.cause()?, effect.values().as_slice()) {
+            (isolation::Cause::GainError, &[gain]) => Some(gain - 1.0),
+            (isolation::Cause::InstantaneousShare, &[share]) => Some(share - SHARE),
+            (isolation::Cause::TimeConstant, &[tau_s]) => Some((tau_s / TAU_S).ln()),
+            (isolation::Cause::VoltageDependentTimeConstant, &[low_s, high_s]) => {
+                Some((high_s - low_s) / TAU_S * range_v / FULL_V)
+            }
+            (isolation::Cause::SecondRelaxation | isolation::Cause::ChargeLeakage, &[share, _]) => Some(share),
+            // The quadratic law less the straight line with the same value at the end of the range.
+            (isolation::Cause::StaticNonlinearity, &[bend]) => Some(-bend * range_v * range_v / (4.0 * FULL_V)),
+            (isolation::Cause::AmplifierLimit, &[limit_v]) => Some(range_v - limit_v),
+            (isolation::Cause::ReadingOffset, &[_, _, offset_v]) => Some(offset_v),
+            (
+                isolation::Cause::Drift
+                | isolation::Cause::Hysteresis
+                | isolation::Cause::Delay
+                | isolation::Cause::AmplifierSlew
+                | isolation::Cause::SeriesLag,
+                &[size],
+            ) => Some(size),
+            _ => None,
+        }
+    }
+
     /// Cause code.
     pub fn name(self) -> &'static str {
         match self {
@@ -38,7 +72,7 @@ impl Fault {
 
     /// True if the bank can name it.
     pub fn has_signature(self) -> bool {
-        model::isolation::Cause::ALL.iter().any(|cause| cause.name() == self.name())
+        self.cause().is_some()
     }
 
     /// A random effect of this fault; at full size as the records of `cargo campaign` have it in the stair, a drift three times

@@ -2,7 +2,7 @@
 
 use model::isolation::Tolerance;
 use model::{OutOfRange, Plant};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -24,26 +24,33 @@ const STREAM: u64 = 7;
 
 /// The spring of a seed: its parameters are drawn from normal distributions around the model's with these 95 % intervals.
 fn known(half_width: f64, tolerated: bool, seed: u64) -> Known {
+    let draw = |random: &mut ChaCha8Rng| -> f64 {
+        let unit: f64 = StandardNormal.sample(random);
+        unit * half_width / 1.96
+    };
+    with_errors(draw, if tolerated { half_width } else { 0.0 }, seed)
+}
+
+/// The spring of a seed: each parameter is anywhere within its tolerance.
+pub(super) fn within(tolerated: f64, seed: u64) -> Known {
+    with_errors(|random| tolerated * random.random_range(-1.0..1.0), tolerated, seed)
+}
+
+/// The spring of a seed with a tolerance; `draw` draws the relative error of a parameter.
+fn with_errors(draw: impl Fn(&mut ChaCha8Rng) -> f64, tolerated: f64, seed: u64) -> Known {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(STREAM);
-    let mut around = |value: f64| {
-        let unit: f64 = StandardNormal.sample(&mut random);
-        value * (1.0 + unit * half_width / 1.96)
-    };
-    let error = |cause: Cause, value: f64, neutral: f64| Effect {
-        cause,
-        form: 0,
-        full_size: vec![value],
-        neutral: vec![neutral],
-        size: 1.0,
+    let mut error = |cause: Cause, neutral: f64| {
+        let full_size = vec![neutral * (1.0 + draw(&mut random))];
+        Effect { cause, form: 0, full_size, neutral: vec![neutral], size: 1.0 }
     };
     let Plant { share, time_constant_s } = Plant::PAPER;
     let errors = vec![
-        error(Cause::TimeConstant, around(time_constant_s), time_constant_s),
-        error(Cause::InstantaneousShare, around(share), share),
-        error(Cause::GainError, around(1.0), 1.0),
+        error(Cause::TimeConstant, time_constant_s),
+        error(Cause::InstantaneousShare, share),
+        error(Cause::GainError, 1.0),
     ];
-    Known { errors, tolerance: Tolerance::from_values([if tolerated { half_width } else { 0.0 }; 3]) }
+    Known { errors, tolerance: Tolerance::from_values([tolerated; 3]) }
 }
 
 /// The table: springs without a fault, and each fault with a signature at full size.

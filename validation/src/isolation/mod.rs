@@ -12,12 +12,12 @@ mod run;
 mod tables;
 mod watched;
 
-pub use false_alarms::{Alarms, count, predicted_per_block};
+pub use false_alarms::{Alarms, Watch, predicted_per_block};
 pub use fault::{Fault, SIZES};
 pub use least_squares::Thresholds;
 pub use page::{TITLE, page};
-pub use run::{Decision, Outcome, run};
-pub use tables::{Row, rows, summary, table};
+pub use run::{Decision, Outcome, Size, run};
+pub use tables::{Row, rows, sizes, summary, table};
 
 /// Standard deviations of the noise in the tables, in percent of 500 V.
 pub const NOISES: [f64; 2] = [0.2, 1.0];

@@ -8,10 +8,12 @@ use rand_chacha::ChaCha8Rng;
 use super::fault::Fault;
 use super::least_squares::{LeastSquares, Thresholds};
 use super::watched::{RATE_HZ, Tick, Watched};
-use crate::ground_truth::Effect;
+use crate::ground_truth::{Effect, Live};
 
 /// Length of a run, in s.
 pub(super) const RUN_S: f64 = 180.0;
+/// Ratio of the sizes of two faults whose readings give the sensitivity to the size.
+const CHANGED: f64 = 1.01;
 /// Time for which the rival may settle, in s; no fault begins before.
 pub(super) const SETTLED_S: f64 = 30.0;
 
@@ -41,6 +43,10 @@ pub struct Outcome {
     pub limit_s: Option<f64>,
     /// Time of the first name, and whether it was right.
     pub first: Option<(f64, bool)>,
+    /// Time from which readings without noise exclude every other cause by the naming rule.
+    pub isolable_s: Option<f64>,
+    /// The size that is reported at the end, if the name is right.
+    pub size: Option<Size>,
     /// Decision at the end of the run.
     pub last: Decision,
     /// True if the decision at the end is ambiguous, and the right name is one of the two.
@@ -51,6 +57,20 @@ pub struct Outcome {
     pub rival_right: bool,
     /// Largest deviations of the rival's parameters.
     pub deviations: [f64; 3],
+}
+
+/// A reported size, in the unit of its cause.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// The true size.
+    pub truth: f64,
+    /// Reported size less the true one.
+    pub error: f64,
+    /// Half width of the reported 95 % interval.
+    pub half_width: f64,
+    /// Half width of the 95 % interval of an unbiased estimate from all readings since the fault began that knows all but the size
+    /// (Cramer and Rao).
+    pub least_half_width: f64,
 }
 
 fn decision(verdict: Verdict, fault: Fault) -> Decision {
@@ -118,12 +138,19 @@ pub(super) fn run_with(
         alarm_s: None,
         limit_s: None,
         first: None,
+        isolable_s: None,
+        size: None,
         last: Decision::Quiet,
         one_of_two: false,
         rival_s: None,
         rival_right: false,
         deviations: [0.0; 3],
     };
+    // For the limits: the bank without noise, and a spring under the same voltage with a slightly different size of the fault.
+    let mut exact = watched.reference();
+    let changed = effect.as_ref().map(|effect| effect.at(CHANGED * effect.size));
+    let mut other: Option<Live> = None;
+    let mut information = 0.0;
     let (mut begun, mut at, mut nats) = (false, 0, 0.0);
     for tick in 0..ticks {
         let now_s = f64::from(tick) / RATE_HZ;
@@ -132,6 +159,9 @@ pub(super) fn run_with(
             let effects: Vec<Effect> = known.errors.iter().cloned().chain(effect.clone()).collect();
             watched.change(&effects);
             watched.stuck = fault == Fault::Stuck;
+            exact.start();
+            let effects: Vec<Effect> = known.errors.iter().cloned().chain(changed.clone()).collect();
+            other = Some(watched.with(&effects));
         }
         while targets[at].0 < now_s {
             at += 1;
@@ -143,7 +173,19 @@ pub(super) fn run_with(
             outcome.deviations = std::array::from_fn(|i| outcome.deviations[i].max(off[i].abs()));
         }
         let since_s = now_s - onset_s;
+        // Repeated where the reading is.
+        exact.tick(applied, model, Some(expected + 1e-9 * (read - expected)));
+        if let Some(other) = &mut other {
+            let (_, changed) = other.hold(applied, 1.0 / RATE_HZ);
+            information += ((changed.expected - expected) / watched.noise_v).powi(2);
+        }
         if begun {
+            if outcome.isolable_s.is_none()
+                && ends_block
+                && fault.cause().is_some_and(|cause| exact.excludes_others(cause))
+            {
+                outcome.isolable_s = Some(since_s);
+            }
             nats += 0.5 * ((expected - model) / watched.noise_v).powi(2);
             if outcome.limit_s.is_none() && nats >= alarm_nats {
                 outcome.limit_s = Some(since_s);
@@ -165,6 +207,39 @@ pub(super) fn run_with(
     }
     let verdict = watched.verdict();
     outcome.last = decision(verdict, fault);
+    if let (Decision::Right, Some(found)) = (outcome.last, watched.finding()) {
+        let range_v = Settings::PAPER.range_v;
+        let size = |effect: &Option<Effect>| effect.as_ref().and_then(|effect| fault.size(effect, range_v));
+        outcome.size = size(&effect).zip(size(&changed)).map(|(truth, changed)| Size {
+            truth,
+            error: found.size - truth,
+            half_width: found.half_width,
+            least_half_width: 1.96 * (changed - truth).abs() / information.sqrt(),
+        });
+    }
     outcome.one_of_two = matches!(verdict, Verdict::Ambiguous(a, b) if [a.name(), b.name()].contains(&fault.name()));
     Ok(outcome)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground_truth::Cause;
+
+    /// No name comes before the readings can show it, and no interval is narrower than that of Cramer and Rao.
+    #[test]
+    fn a_name_and_a_size_are_no_better_than_their_limits() {
+        let open = Thresholds([f64::INFINITY; 3]);
+        for (cause, percent) in [(Cause::GainError, 0.2), (Cause::TimeConstant, 1.0), (Cause::Delay, 0.2)] {
+            let fault = Fault::Effect(cause);
+            let Outcome { first, isolable_s, size, last, .. } = run(fault, 0.5, percent, 1, &open).unwrap();
+            let (first_s, isolable_s, size) = (first.unwrap().0, isolable_s.unwrap(), size.unwrap());
+            println!("{cause}: name after {first_s} s, limit {isolable_s} s, {size:?}");
+            assert_eq!(last, Decision::Right, "{cause}");
+            assert!(isolable_s > 0.0 && isolable_s <= first_s, "{cause}: name after {first_s} s, limit {isolable_s} s");
+            let Size { truth, error, half_width, least_half_width } = size;
+            assert!(error.abs() < 0.2 * truth.abs(), "{cause}: {size:?}");
+            assert!(least_half_width > 0.0 && least_half_width < 1.01 * half_width, "{cause}: {size:?}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::fault::{Fault, SIZES};
 use super::least_squares::Thresholds;
-use super::run::{Decision, Outcome, run};
+use super::run::{Decision, Outcome, Size, run};
 use crate::markdown;
 use crate::statistics::median;
 
@@ -52,6 +52,29 @@ impl Row {
         median(&times).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.1}"))
     }
 
+    /// The reported sizes of the right names.
+    fn sizes(&self) -> Vec<Size> {
+        self.outcomes.iter().filter_map(|outcome| outcome.size).collect()
+    }
+
+    /// Error, half width, least half width, relative to the true size and in percent, and how often the interval contains it.
+    fn size_cells(&self) -> Vec<String> {
+        let sizes = self.sizes();
+        let percent = |of: fn(&Size) -> f64| {
+            let parts: Vec<f64> = sizes.iter().map(|size| 100.0 * (of(size) / size.truth).abs()).collect();
+            median(&parts).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.2}"))
+        };
+        vec![
+            self.fault.name().to_owned(),
+            format!("{}", self.size),
+            sizes.len().to_string(),
+            percent(|size| size.error),
+            percent(|size| size.half_width),
+            percent(|size| size.least_half_width),
+            covered(&sizes),
+        ]
+    }
+
     fn cells(&self) -> Vec<String> {
         let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
         let first_wrong = self.count(|outcome| outcome.first.is_some_and(|(_, right)| !right));
@@ -63,6 +86,7 @@ impl Row {
             self.times(|outcome| outcome.alarm_s),
             self.times(|outcome| outcome.limit_s),
             self.times(|outcome| outcome.first.map(|(time, _)| time)),
+            self.times(|outcome| outcome.isolable_s),
             number(self.ended(Decision::Right)),
             format!("{} ({})", self.ended(Decision::Ambiguous), self.count(|outcome| outcome.one_of_two)),
             number(self.ended(Decision::Unknown)),
@@ -75,6 +99,22 @@ impl Row {
     }
 }
 
+/// How many of the intervals contain the true size.
+fn covered(sizes: &[Size]) -> String {
+    let inside = sizes.iter().filter(|size| size.error.abs() <= size.half_width).count();
+    format!("{inside} of {}", sizes.len())
+}
+
+/// The table of the reported sizes, medians in percent of the true size.
+pub fn sizes(rows: &[Row]) -> String {
+    let header = ["fault", "size", "right", "error %", "half width %", "least half width %", "contains the true size"];
+    let lines = rows.iter().filter(|row| !row.sizes().is_empty()).map(Row::size_cells);
+    let all: Vec<Size> = rows.iter().flat_map(Row::sizes).collect();
+    let mut sum = vec![String::new(); header.len()];
+    (sum[0], sum[2], sum[6]) = ("all".to_owned(), all.len().to_string(), covered(&all));
+    markdown::table(&header, lines.chain([sum]))
+}
+
 /// The table of all faults and sizes.
 pub fn table(rows: &[Row]) -> String {
     let header = [
@@ -83,6 +123,7 @@ pub fn table(rows: &[Row]) -> String {
         "alarm s",
         "limit s",
         "name s",
+        "limit of name s",
         "right",
         "ambiguous (one is right)",
         "unknown",

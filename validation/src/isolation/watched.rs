@@ -1,9 +1,10 @@
 //! The controller with its sensor on a spring of the ground truth, and the bank after each of its ticks.
 
-use model::isolation::{self, Tolerance, Verdict};
+use model::isolation::{self, Finding, Tolerance, Verdict};
 use model::{
     Config, Feedback, Input, OutOfRange, Reading, SampleTime, ScaledStiffness, Settings, State, Validate, Volts,
 };
+use simulation::isolation::reference::Bank;
 
 use crate::ground_truth::{Effect, Live, Noise};
 
@@ -16,6 +17,7 @@ const TOP_V: f64 = 500.0;
 pub(super) struct Watched {
     config: Config,
     state: State,
+    settings: isolation::Settings,
     bank: isolation::Config,
     bank_state: isolation::State,
     live: Live,
@@ -59,6 +61,7 @@ impl Watched {
         Ok(Self {
             config: Settings { feedback, ..Settings::PAPER }.validate()?.quantize(),
             state: State::default(),
+            settings,
             bank: settings.validate(SampleTime::from_rate(RATE_HZ)?)?.quantize(),
             bank_state: isolation::State::default(),
             live: Live::new(&[], noise, seed, TOP_V, ticks as usize),
@@ -72,6 +75,13 @@ impl Watched {
     /// Gives the spring and its sensor other effects from now on.
     pub(super) fn change(&mut self, effects: &[Effect]) {
         self.live.change(effects, TOP_V);
+    }
+
+    /// The spring as it is now, but with these effects from now on.
+    pub(super) fn with(&self, effects: &[Effect]) -> Live {
+        let mut live = self.live.clone();
+        live.change(effects, TOP_V);
+        live
     }
 
     /// Runs a tick of the controller and of the bank.
@@ -90,6 +100,16 @@ impl Watched {
         self.measured = Reading::fresh(value);
         self.bank.tick(&mut self.bank_state, output.applied, model, Some(value));
         Ok(Tick { applied, model: model.to_f64(), read, expected })
+    }
+
+    /// What the bank reports of the cause that explains most.
+    pub(super) fn finding(&self) -> Option<Finding> {
+        self.bank_state.report().finding(&self.settings, RATE_HZ)
+    }
+
+    /// The bank in double precision, with the same settings.
+    pub(super) fn reference(&self) -> Bank {
+        Bank::new(self.settings, RATE_HZ)
     }
 
     /// Verdict of the bank.
