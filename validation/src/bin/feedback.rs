@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
 use model::{Amplifier, Approach, Compensation, Feedback, Margin, Settings};
-use validation::closed_loop::{effects, requirement, sensor_failure, tables};
+use validation::closed_loop::{bound, effects, requirement, sensor_failure, tables};
 use validation::criterion::{self, Criterion};
 
 /// Run the controller in closed loop with springs with known effects, with a stiffness sensor and without.
@@ -36,7 +36,7 @@ overshoots by at most 2 %. A step that no voltage completes is impossible.
 The shortest possible time is that of a controller that knows the spring and does not care what follows. The bound is the time in which a
 controller with the sensor can have both at 97 %, the paper's spring and the one with the effect, and keep both between 97 and 102 %: with
 one voltage until a reading tells them apart by 2 standard deviations, which it does under full voltage, and then with one for each; in
-later steps the readings of 30 s have told them apart. It is found by the linear programme of `vsj bound`. Steps with a bound above what is
+later steps the readings of 30 s have distinguished them. It is found by the linear programme of `vsj bound`. Steps with a bound above what is
 required are forbidden by physics; the others that are not in time a better controller could make, if it had no other effects to expect.
 Effects of the readings are none of the spring: their bound is that of the paper's spring. A sensor that sticks does so in the first step.
 
@@ -77,8 +77,7 @@ fn run(cli: &Cli) -> Result<bool> {
         write!(text, "### Sensor failure for {} s\n\n{}\n", sensor_failure::FAILS_S, tables::failures(&responses))?;
         criteria.extend(tables::criteria(name, &outcomes, feedback.noise_v));
     }
-    let margin =
-        Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: requirement::OVERSHOOT_PERCENT / 100.0 };
+    let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: bound::OVERSHOOT_PERCENT / 100.0 };
     let robust = Settings { compensation: Compensation::Robust(margin), ..fast };
     let name = "The robust controller at 1000 V";
     let outcomes = requirement::all(&robust, cli.seeds, cli.first_seed).map_err(|error| anyhow!("{name}: {error}"))?;

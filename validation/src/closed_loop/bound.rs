@@ -12,12 +12,13 @@
 use model::Settings;
 use simulation::robust_bound::{Apart, Response};
 
-use super::requirement::OVERSHOOT_PERCENT;
 use crate::ground_truth::{Cause, Effect, Live, Noise};
 
+/// Largest overshoot, in percent of the step.
+pub const OVERSHOOT_PERCENT: f64 = 2.0;
 /// Longest bound that is computed, in s.
 pub const LONGEST_S: f64 = 4.0;
-/// Difference at which two springs are told apart, in standard deviations.
+/// Difference at which two springs are distinguished, in standard deviations.
 const APART: f64 = 2.0;
 /// Time after which a spring has settled, in s.
 const SETTLED_S: f64 = 60.0;
@@ -69,14 +70,14 @@ impl Step {
         let in_front = [Cause::StaticNonlinearity, Cause::Hysteresis, Cause::AmplifierLimit, Cause::AmplifierSlew];
         let is_first = self.from == 0.0 && !in_front.into_iter().any(|cause| of(cause).is_some());
         let common_s = match &other {
-            Some(other) if is_first => self.told_apart_s(&paper, other),
+            Some(other) if is_first => self.distinguished_s(&paper, other),
             _ => 0.0,
         };
         Pair { springs: std::iter::once(paper).chain(other).collect(), common_s }
     }
 
     /// Time of the first reading with which full voltage tells two springs apart, in s.
-    fn told_apart_s(&self, paper: &Response, other: &Response) -> f64 {
+    fn distinguished_s(&self, paper: &Response, other: &Response) -> f64 {
         let differences =
             paper.full.iter().zip(&other.full).map(|(a, b)| (a - b) * (self.to - self.from) / self.noise_v);
         let mut energy = 0.0;

@@ -23,8 +23,6 @@ pub const WITHIN_S: f64 = 0.6;
 const REST_TICKS: usize = 100;
 /// Largest multiple of the shortest possible time, where that is longer.
 const OF_SHORTEST: f64 = 1.05;
-/// Largest overshoot, in percent of the step.
-pub const OVERSHOOT_PERCENT: f64 = 2.0;
 
 /// One effect over all its seeds and all steps upward, with a sensor.
 #[derive(Clone, Debug)]
@@ -178,7 +176,7 @@ pub fn criteria(controller: &str, outcomes: &[Outcome]) -> Vec<Criterion> {
         let allowed_s = (it.slowest.allowed_s() * 1000.0).round() / 1000.0;
         [
             Criterion::at_most(time, allowed_s, it.slowest.t97_s),
-            Criterion::at_most(overshoot, OVERSHOOT_PERCENT, it.overshoot_percent),
+            Criterion::at_most(overshoot, bound::OVERSHOOT_PERCENT, it.overshoot_percent),
         ]
     };
     outcomes.iter().flat_map(of).collect()
@@ -207,7 +205,10 @@ mod tests {
         assert!(forbidden == 0 && (bound_s.unwrap() - slowest.shortest_s).abs() < 0.03, "{forbidden} {bound_s:?}");
         assert!((slowest.shortest_s - 0.446).abs() < 0.003, "{slowest:?}");
         assert!(slowest.t97_s >= slowest.shortest_s && slowest.t97_s < 1.05 * slowest.shortest_s, "{slowest:?}");
-        assert!(in_time == [5, 5, 5] && overshoot_percent < OVERSHOOT_PERCENT, "{in_time:?} {overshoot_percent}");
+        assert!(
+            in_time == [5, 5, 5] && overshoot_percent < bound::OVERSHOOT_PERCENT,
+            "{in_time:?} {overshoot_percent}"
+        );
         assert!(criteria("it", &[one(&robust(), Fault::None, 1..2).unwrap()]).iter().all(Criterion::is_met));
     }
 
