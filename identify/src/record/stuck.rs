@@ -446,9 +446,9 @@ mod tests {
     #[test]
     fn a_sensor_may_stick_over_a_change_of_the_voltage() {
         let mut record = noisy();
-        (708..711).for_each(|row| record.rows[row].measured = record.rows[707].measured);
-        let held = held_in(record, &[[716, 820]], None);
-        assert_eq!(stuck_in(&held).unwrap().rows, rows_of(&[[716, 820]]));
+        (718..721).for_each(|row| record.rows[row].measured = record.rows[717].measured);
+        let held = held_in(record, &[[726, 830]], None);
+        assert_eq!(stuck_in(&held).unwrap().rows, rows_of(&[[726, 830]]));
     }
 
     #[test]

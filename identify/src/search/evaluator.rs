@@ -257,7 +257,7 @@ const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.
 const STARTS_IF_SCARCE: usize = 16;
 /// Number of forms of [`Forms::Rare`] that are fitted.
-const RARE_FORMS_FITTED: usize = 4;
+const RARE_FORMS_FITTED: usize = 6;
 /// Smallest predicted gain of what is fitted beside one of these, relative to its own.
 const PART_OF_BEST: f64 = 0.1;
 /// Predicted gain of one of these, relative to its price, for which a search gets more work.
@@ -429,6 +429,6 @@ mod tests {
         found.extend([of(7, 2, 60.0), of(8, 1, 5.0)]);
         let kept: Vec<(usize, usize)> = rare(found).iter().map(|it| (it.block.effect, it.block.form)).collect();
         // That of the third effect promises less than a tenth.
-        assert_eq!(kept, [(3, 5), (3, 4), (7, 2)]);
+        assert_eq!(kept, [(3, 5), (3, 4), (3, 3), (3, 2), (7, 2)]);
     }
 }
