@@ -36,10 +36,15 @@ const MOST_ADDED: f64 = 3.0;
 /// Largest ratio of the parts of two decades.
 const STEEPEST: f64 = 5.0;
 
+/// Returns the part of a creep that is seen within the record's duration.
+fn within(tau_s: f64, data: &Data) -> f64 {
+    -(-data.duration_s() / tau_s).exp_m1()
+}
+
 /// Returns the settled value of the creep that is added, relative to the nominal response. The first coordinate is what is added within
 /// the record's duration: of a flow that is known, the settled value is not.
 fn added(point: &[f64], data: &Data) -> f64 {
-    point[0] / -(-data.duration_s() / point[1].exp()).exp_m1()
+    point[0] / within(point[1].exp(), data)
 }
 
 impl Effect for SecondRelaxation {
@@ -53,7 +58,7 @@ impl Effect for SecondRelaxation {
 
     /// Of creep that is much slower than the record hardly anything is seen: what is missing of it is a gain.
     fn location_at(&self, form: usize, point: &[f64], data: &Data) -> Location {
-        let within = |tau_s: f64| -(-data.duration_s() / tau_s).exp_m1();
+        let within = |tau_s: f64| within(tau_s, data);
         let slow_s = point[1].exp();
         let seen = match form {
             OF_THE_REST | OF_EVERYTHING => within(slow_s),
@@ -114,9 +119,9 @@ impl Effect for SecondRelaxation {
             BY_DECADES => (ADDED_BY_DECADES, Some(0.0)),
             _ => return None,
         };
-        let within = gain * point[0] * -(-data.duration_s() / point[1].exp()).exp_m1();
-        let point = [within, point[1]].into_iter().chain(ratio).collect();
-        (0.0..MOST_ADDED).contains(&within).then_some((form, point))
+        let added = gain * point[0] * within(point[1].exp(), data);
+        let point = [added, point[1]].into_iter().chain(ratio).collect();
+        (0.0..MOST_ADDED).contains(&added).then_some((form, point))
     }
 
     fn unmodelled(&self, _: usize, _: &[f64], _: &Data, _: &Chain) -> Option<toml::Value> {

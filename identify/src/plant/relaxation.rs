@@ -119,8 +119,8 @@ impl Relaxation {
         self.share = share;
     }
 
-    /// Adds further lags with these weights, which the other lags and oscillations lose in proportion, and the feedthrough as well if it
-    /// is not `kept`. If there is no place for as many lags, they replace the further ones.
+    /// Adds further lags with these weights, which the other lags and oscillations lose in proportion, and the feedthrough as well unless
+    /// `share_is_kept`. If there is no place for as many lags, they replace the further ones.
     pub fn add_lags(&mut self, lags: &[Part], share_is_kept: bool) {
         let part: f64 = lags.iter().map(|lag| lag.part).sum();
         if share_is_kept {

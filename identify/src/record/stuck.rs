@@ -237,8 +237,7 @@ impl Readings {
         };
         // Until the next change: the one after may take the response back.
         let rows = (changed..run.end).take_while(|&row| !differs(changed, row)).count() - 1;
-        let places = (1..self.value.len() - rows).step_by(self.value.len().div_ceil(MOST_PLACES));
-        let places = places.filter(|&row| self.free[row - 1] && self.free[row + rows]);
+        let places = self.places(rows).filter(|&row| self.free[row - 1] && self.free[row + rows]);
         let after_change = places.filter(|&row| differs(row - 1, row + rows));
         let mut moved: Vec<f64> =
             after_change.map(|row| (self.value[row + rows] - self.value[row - 1]).abs()).collect();
@@ -267,8 +266,12 @@ impl Readings {
                 && (swept / ALIKE..=swept * ALIKE).contains(&self.swept(rows))
                 && self.are_mostly_free(rows)
         };
-        let starts = (1..self.value.len().saturating_sub(run.len())).step_by(self.value.len().div_ceil(MOST_PLACES));
-        starts.map(|start| start..start + run.len()).filter(is_alike).nth(FEWEST_PLACES - 1).is_some()
+        self.places(run.len()).map(|start| start..start + run.len()).filter(is_alike).nth(FEWEST_PLACES - 1).is_some()
+    }
+
+    /// First rows of places elsewhere, with so many rows after them.
+    fn places(&self, rows: usize) -> impl Iterator<Item = usize> + use<> {
+        (1..self.value.len().saturating_sub(rows)).step_by(self.value.len().div_ceil(MOST_PLACES))
     }
 
     /// Sum of the voltage's changes in some rows, in V.
