@@ -75,7 +75,7 @@ enum Command {
     /// Format, lints and unit tests: after every edit
     Check,
     /// Setup, then every check and test
-    Test,
+    Test(test::Args),
     /// Run the firmware on the report's stair under QEMU
     Emulate(Forwarded),
     /// Everything that the emulated firmware must show
@@ -280,7 +280,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
     match command {
         Setup => setup::run(),
         Check => check::run(),
-        Test => test::run(),
+        Test(args) => test::run(&args),
         Flash(variant) => flash::run(variant),
         Image(args) => image::run(args),
         Bench(args) => bench::run(&args),

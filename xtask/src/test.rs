@@ -59,13 +59,18 @@ const LANES: Lanes = Lanes {
         Step::emulation("size", &["size", "--feedback", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("boot", &["boot"]),
         Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
-        // Bounds on what the bank adds to the tick, and each controller for each kind of spring.
-        Step::emulation("cost bank", &["emulate", "--isolation"]),
-        Step::emulation("cost ticks", &["emulate", "--blocks"]),
         Step::emulation("clients", &["clients"]),
         Step::emulation("c library", &["capi"]),
     ],
 };
+
+/// Before a release as well: what needs further images and would take the whole beyond 20 minutes.
+const LONG: &[Step] = &[
+    // Bounds on what the bank adds to the tick, and each controller for each kind of spring.
+    Step::emulation("cost bank", &["emulate", "--isolation"]),
+    Step::emulation("cost ticks", &["emulate", "--blocks"]),
+    Step::emulation("boot all", &["boot", "--all"]),
+];
 
 #[rustfmt::skip]
 const fn lint(package: &'static str, features: &'static str) -> [&'static str; 13] {
@@ -77,12 +82,13 @@ const fn lint(package: &'static str, features: &'static str) -> [&'static str; 1
 pub(crate) fn help() -> String {
     let Lanes { build, host, beside, built } = LANES;
     format!(
-        "Steps; the first that fails ends the run:\n  setup      cargo xtask setup\n{}\nthen\n{}{}\nand, beside these,\n{}{}",
+        "Steps; the first that fails ends the run:\n  setup      cargo xtask setup\n{}\nthen\n{}{}\nand, beside these,\n{}{}\nWith --long also\n{}",
         steps::help(FIRST),
         steps::help(&[build]),
         steps::help(host),
         steps::help(beside),
-        steps::help(built)
+        steps::help(built),
+        steps::help(LONG)
     )
 }
 
@@ -106,9 +112,18 @@ fn forget_packages() -> Result<()> {
     })
 }
 
+/// Arguments of `cargo xtask test`.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Also what is verified only before a release, because it takes long
+    #[arg(long)]
+    long: bool,
+}
+
 /// Runs every step; an error names the first that fails.
-pub(crate) fn run() -> Result<()> {
-    let progress = Progress::of(1 + FIRST.len() + LANES.count());
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let long = if args.long { LONG } else { &[] };
+    let progress = Progress::of(1 + FIRST.len() + LANES.count() + long.len());
     progress.begin("setup");
     setup::run()?;
     setup::target(page::WASM)?;
@@ -118,6 +133,10 @@ pub(crate) fn run() -> Result<()> {
         step.run()?;
     }
     LANES.run(&progress)?;
+    for step in long {
+        progress.begin(step.name);
+        step.run()?;
+    }
     progress.end();
     Ok(())
 }
