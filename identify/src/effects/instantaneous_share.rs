@@ -25,8 +25,8 @@ fn times_s(data: &Data) -> (f64, f64) {
     (shortest, (LONGEST * REFERENCE_TIME_CONSTANT_S).max(2.0 * shortest))
 }
 
-/// Nominal share from which initial points on both sides of it are added.
-const LARGE: f64 = 0.25;
+/// Distances of initial points from the nominal share, on both sides of it: predicted gains do not see what lies behind.
+const INITIAL_CHANGES: [f64; 4] = [-0.2, -0.04, 0.04, 0.2];
 
 impl Effect for InstantaneousShare {
     fn cause(&self) -> &'static str {
@@ -70,8 +70,7 @@ impl Effect for InstantaneousShare {
             return times.flat_map(|time| [0.1, -0.05].map(|part| vec![part, time.ln()])).collect();
         }
         let nominal = context.data.normalisation.share;
-        let of_large = [0.5 * nominal, 0.5 * (1.0 + nominal)].into_iter().filter(|_| nominal > LARGE);
-        [0.04, 0.2].into_iter().chain(of_large).map(|share| vec![share]).collect()
+        INITIAL_CHANGES.map(|change| vec![nominal + change]).into()
     }
 
     fn quantities(&self, form: usize, point: &[f64], _: &Data) -> Vec<Quantity> {

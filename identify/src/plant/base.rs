@@ -54,7 +54,10 @@ impl Base {
             ("law", |file| file.law.take().is_some()),
             ("leakage", |file| file.leakage.take().is_some()),
             ("amplifier", |file| file.amplifier.take().is_some()),
-            ("relaxation.tau_high_s", |file| file.relaxation.tau_high_s.take().is_some()),
+            // One that is the same as at 0 V is no part of the spring.
+            ("relaxation.tau_high_s", |file| {
+                file.relaxation.tau_high_s.take().is_some_and(|high_s| high_s != file.relaxation.tau_s[0])
+            }),
             ("relaxation.weights", |file| {
                 file.relaxation.tau_s.truncate(1);
                 !std::mem::take(&mut file.relaxation.weights).is_empty()
