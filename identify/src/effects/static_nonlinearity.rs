@@ -83,8 +83,6 @@ const LEAST_OF_KINK: f64 = 1e-3;
 /// Places of a kink, and slopes below it relative to that above, at initial points.
 const INITIAL_KINKS: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.7];
 const INITIAL_SLOPES: [f64; 2] = [0.5, 1.5];
-/// Fraction of the rows with each sign of the voltage from which a curve for both signs can be found.
-const ROWS_OF_SIGN: f64 = 0.1;
 
 /// Part of the range over which the slope at its end is taken.
 const END_STEP: f64 = 1e-3;
@@ -184,13 +182,6 @@ fn levels(data: &Data) -> usize {
     rows.iter().filter(|rows| **rows as f64 >= ROWS_OF_LEVEL * data.rows() as f64).count()
 }
 
-/// Returns true if the record has rows at voltages of both signs.
-fn has_both_signs(data: &Data) -> bool {
-    let positive = data.voltage_v.iter().filter(|voltage| **voltage > 0.0).count() as f64;
-    let negative = data.voltage_v.iter().filter(|voltage| **voltage < 0.0).count() as f64;
-    positive.min(negative) > ROWS_OF_SIGN * data.rows() as f64
-}
-
 impl Effect for StaticNonlinearity {
     fn cause(&self) -> &'static str {
         "static-nonlinearity"
@@ -234,7 +225,7 @@ impl Effect for StaticNonlinearity {
         let (curve, place) = FORMS[form];
         let levels = levels(context.data);
         let unknown = place != Before && !context.data.estimates_any_start();
-        if levels <= curve.coefficients() || unknown || matches!(curve, Uneven) && !has_both_signs(context.data) {
+        if levels <= curve.coefficients() || unknown || matches!(curve, Uneven) && !context.data.has_both_signs() {
             return Vec::new();
         }
         match curve {

@@ -26,10 +26,35 @@ use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
+/// Which voltages of the amplifier have a limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Limited {
+    /// Those of both signs, at the same magnitude.
+    #[default]
+    Both,
+    /// The positive ones.
+    Positive,
+    /// The negative ones.
+    Negative,
+}
+
+impl Limited {
+    /// Returns true if a voltage, in V, has a limit.
+    fn includes(self, voltage_v: f64) -> bool {
+        match self {
+            Self::Both => true,
+            Self::Positive => voltage_v > 0.0,
+            Self::Negative => voltage_v < 0.0,
+        }
+    }
+}
+
 /// All blocks between the command and the stiffness that effects can modify.
 pub struct Chain<'a> {
     /// Largest magnitude of the amplifier's voltage, in V.
     pub limit_v: f64,
+    /// Sign of the voltages that it limits. A plant file cannot hold one sign alone.
+    pub limited: Limited,
     /// Knee with which it is approached, in V; 0 for none. A plant file cannot hold it.
     pub knee_v: f64,
     /// Largest rate at which the amplifier's voltage rises, in V/s.
@@ -87,6 +112,7 @@ impl<'a> Chain<'a> {
         let slew_v_per_s = number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY);
         Self {
             limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
+            limited: Limited::Both,
             knee_v: 0.0,
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
@@ -197,7 +223,8 @@ impl<'a> Chain<'a> {
             // Zero at 0 V, which a large knee reaches.
             let below = |voltage: f64| at_most(voltage, self.limit_v, self.knee_v);
             let at_rest = below(0.0);
-            signal.map(|voltage| (below(voltage.abs()) - at_rest).copysign(voltage));
+            let limited = |voltage: f64| (below(voltage.abs()) - at_rest).copysign(voltage);
+            signal.map(|voltage| if self.limited.includes(voltage) { limited(voltage) } else { voltage });
         }
         signal.before = self.initial_v.unwrap_or(signal.before);
         if self.follow_tau_s > 0.0 {

@@ -21,6 +21,9 @@ const THINNED_PIECES: usize = 8_000;
 /// Largest error of the chords of those pieces, as a fraction of the full scale.
 const THINNED_CHORD_ERROR: f64 = 1e-3;
 
+/// Fraction of the rows with each sign of the voltage from which a response to each sign can be found.
+const ROWS_OF_SIGN: f64 = 0.1;
+
 /// A record in the form that every fit uses; all vectors have one element per reading.
 #[derive(Clone, Debug)]
 pub struct Data {
@@ -231,6 +234,13 @@ impl Data {
     /// Returns the number of readings.
     pub fn rows(&self) -> usize {
         self.reading.len()
+    }
+
+    /// Returns true if the record has rows at voltages of both signs.
+    pub fn has_both_signs(&self) -> bool {
+        let positive = self.voltage_v.iter().filter(|voltage| **voltage > 0.0).count() as f64;
+        let negative = self.voltage_v.iter().filter(|voltage| **voltage < 0.0).count() as f64;
+        positive.min(negative) > ROWS_OF_SIGN * self.rows() as f64
     }
 
     /// Returns the time from the first to the last reading, in s; that of the longest of several records.
