@@ -16,10 +16,20 @@ const STEPS: usize = 100;
 const FULL_SCALE_V: f64 = 500.0;
 const FREQ_HZ: f64 = 0.73;
 
-/// Diagnoses the paper's spring under steps of 6 s, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
+/// Diagnoses the paper's spring under steps of 6 s between 0 and 500 V, as [`diagnosed_from`].
+fn diagnosed(
+    amplified_v: impl Fn(f64, f64) -> f64,
+    tau_s: impl Fn(usize) -> f64,
+    read: impl FnMut(usize, f64, f64) -> f64,
+) -> Report {
+    diagnosed_from(0.0, amplified_v, tau_s, read)
+}
+
+/// Diagnoses the paper's spring under steps of 6 s between `lowest_v` and 500 V, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
 /// and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `read` the reading in a row from response and noise; all others in
 /// V.
-fn diagnosed(
+fn diagnosed_from(
+    lowest_v: f64,
     amplified_v: impl Fn(f64, f64) -> f64,
     tau_s: impl Fn(usize) -> f64,
     mut read: impl FnMut(usize, f64, f64) -> f64,
@@ -34,7 +44,8 @@ fn diagnosed(
     let (mut voltage_v, mut across_v, mut lag) = (0.0, 0.0, 0.0);
     let row = |row: usize| {
         if row % 60 == 20 {
-            voltage_v = if row == 20 { FULL_SCALE_V } else { (FULL_SCALE_V * random()).round() };
+            let part = if row == 20 { 1.0 } else { random() };
+            voltage_v = (lowest_v + (FULL_SCALE_V - lowest_v) * part).round();
         }
         // The first reading after a step has its feedthrough.
         let response = share * amplified_v(voltage_v, across_v) + (1.0 - share) * lag;
@@ -198,6 +209,17 @@ fn a_limit_of_the_amplifier_that_is_approached_gradually_has_a_knee() {
     let report = diagnosed(|voltage_v, _| soft(voltage_v, 330.0), |_| TAU_S, plain);
     let value = |name| of_only_finding(&report, "amplifier-limit", name).value;
     assert!((value("limit_v") - 330.0).abs() < 5.0 && (10.0..40.0).contains(&value("knee_v")), "{report:#?}");
+}
+
+#[test]
+fn a_limit_of_the_amplifier_for_one_sign_is_found() {
+    let limits: [(fn(f64, f64) -> f64, _, _); 2] =
+        [(|v, _| v.min(330.0), "limit_v", 330.0), (|v, _| v.max(-270.0), "lower_limit_v", -270.0)];
+    for (amplified_v, name, limit_v) in limits {
+        let report = diagnosed_from(-FULL_SCALE_V, amplified_v, |_| TAU_S, plain);
+        let found_v = of_only_finding(&report, "amplifier-limit", name).value;
+        assert!((found_v - limit_v).abs() < 2.0, "{report:#?}");
+    }
 }
 
 /// A sensor whose reading saturates gradually on both sides, and one that becomes more sensitive.

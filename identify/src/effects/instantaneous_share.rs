@@ -107,6 +107,17 @@ mod tests {
     }
 
     #[test]
+    fn initial_points_lie_on_both_sides_of_every_nominal_share() {
+        for share in [0.0, 0.04, 0.2, 0.24, 0.6, 1.0] {
+            let mut data = data();
+            data.normalisation.share = share;
+            let points = InstantaneousShare.initial_points(0, &FitContext { data: &data, residual: &[], sigma: 1.0 });
+            let nearest = |side: f64| points.iter().filter(|point| side * (point[0] - share) > 0.01).count();
+            assert!(nearest(-1.0) > 0 && nearest(1.0) > 0, "{share}: {points:?}");
+        }
+    }
+
+    #[test]
     fn a_quick_part_stays_beside_creep() {
         let quick = Block { effect: index_of("instantaneous-share").unwrap(), form: QUICK };
         let creep = Block { effect: index_of("second-relaxation").unwrap(), form: 0 };

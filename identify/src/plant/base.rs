@@ -80,3 +80,20 @@ impl Base {
         Chain::of(&self.file, self.relaxation)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_constant_that_is_the_same_at_high_voltage_is_no_part() {
+        let parts = |tau_high_s: Option<f64>| {
+            let mut file = PlantFile::from(Plant::PAPER);
+            file.relaxation.tau_high_s = tau_high_s;
+            Base::new(file).unwrap().without_each().map(|(part, _)| part).collect::<Vec<_>>()
+        };
+        let tau_s = Plant::PAPER.time_constant_s;
+        assert!(parts(None).is_empty() && parts(Some(tau_s)).is_empty());
+        assert_eq!(parts(Some(2.0 * tau_s)), ["relaxation.tau_high_s"]);
+    }
+}
