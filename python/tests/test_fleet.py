@@ -452,6 +452,80 @@ def test_an_exception_of_an_object_stores_package_is_one_line_with_the_address(t
         assert line.startswith("vsj.fleet: " + address) and "Unable to locate credentials" in line, line
 
 
+class StoreError(Exception):
+    """As of an object store's package: no ``OSError``, and not to be read by another process, as it needs two arguments."""
+
+    def __init__(self, code, words):
+        super().__init__(f"{code}: {words}\nand more")
+
+
+def arrow_invalid(*_, **__):
+    raise pyarrow.ArrowInvalid("Could not convert 'x' with type str")
+
+
+@pytest.mark.parametrize(
+    "place, error, why, is_there",
+    [
+        ("parquet", arrow_invalid, "Could not convert 'x' with type str", False),
+        ("before", StoreError("SlowDown", "reduce your rate"), "SlowDown: reduce your rate", False),
+        ("after", StoreError("Timeout", "no answer"), "Timeout: no answer", True),
+        ("before", OSError(28, "No space left on device"), "No space left on device", False),
+    ],
+    ids=["pyarrow", "store", "store-that-has-written", "disk"],
+)
+def test_rows_that_cannot_be_written_are_neither_lost_nor_doubled(copied, tmp_path, engine, monkeypatch, capsys, place, error, why, is_there):
+    from fsspec.implementations.local import LocalFileSystem
+
+    out, move, broken = tmp_path / "out", LocalFileSystem.mv, []
+    words = [str(copied), "--out", str(out), "--scheduler", engine, "--effort", "quick", "--batch", "1", "--json"]
+
+    def failing(fs, source, target, *rest, **more):
+        is_second = "/parts/" in target and len(parts(out)) == 1
+        if not is_second or place == "after":
+            move(fs, source, target, *rest, **more)
+        if is_second and not broken:
+            broken.append(target)
+            raise error
+
+    def write(table, file):
+        writes = pyarrow.parquet.write_table if len(parts(out)) != 1 else error
+        writes(table, file)
+
+    with monkeypatch.context() as patched:
+        if place == "parquet":
+            patched.setattr(store, "parquet", types.SimpleNamespace(read_table=pyarrow.parquet.read_table, write_table=write))
+        else:
+            patched.setattr(LocalFileSystem, "mv", failing)
+        assert fleet.main(words) == 1
+    printed = capsys.readouterr()
+    [line] = printed.err.strip().splitlines()
+    expected = rf"vsj\.fleet: --out {re.escape(str(out))}: parts/\w+\.parquet with 1 record from s\d/\S+\.csv cannot be written: {why}; "
+    assert re.fullmatch(expected + r"at least \d of 4 records are finished; the same command goes on", line), line
+    there = len(parts(out))
+    assert there == 1 + is_there and not list(out.rglob("*.partial")) and not printed.out
+    assert fleet.main(words) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["finished_before"], answer["finished_now"]) == (there, 4 - there)
+    assert len(rows_of(out)) == 4 and len(parts(out)) == 4
+
+
+@pytest.mark.parametrize("name", [store.TABLE, page.NAME])
+def test_a_table_or_page_that_cannot_be_written_is_one_line(copied, tmp_path, engine, monkeypatch, capsys, name):
+    from fsspec.implementations.local import LocalFileSystem
+
+    move = LocalFileSystem.mv
+
+    def failing(fs, source, target, *rest, **more):
+        if target.endswith(name):
+            raise StoreError("SlowDown", "reduce your rate")
+        move(fs, source, target, *rest, **more)
+
+    monkeypatch.setattr(LocalFileSystem, "mv", failing)
+    assert fleet.main([str(copied), "--out", str(tmp_path / "out"), "--scheduler", engine, "--effort", "quick"]) == 1
+    [line] = capsys.readouterr().err.strip().splitlines()
+    assert f": {name} cannot be written: SlowDown: reduce your rate; at least 4 of 4 records are finished" in line
+
+
 @pytest.mark.parametrize("module, name", [(store, "write_table"), (fleet, "summary"), (page, "page"), (records, "listed"), (cost, "measured")])
 def test_ctrl_c_before_and_after_the_diagnoses_is_one_line_too(copied, tmp_path, engine, monkeypatch, capsys, module, name):
     def interrupted(*_):

@@ -24,8 +24,8 @@ RECORDS is a folder with SPRING/DATE.csv, .mcap or .parquet, or a CSV or Parquet
 spring, time, plant. The same command goes on where an earlier one ended, however it ended. In --out: diagnoses.parquet, a row for
 each record; fleet.html, the summary; parts/, the state.
 
-Exit codes: 0 every record is diagnosed, 1 a record has an error in its row, or scheduler or workers are lost, 2 bad arguments or input,
-130 Ctrl-C."""
+Exit codes: 0 every record is diagnosed, 1 a record has an error in its row, results cannot be written, or scheduler or workers are lost,
+2 bad arguments or input, 130 Ctrl-C."""
 
 
 def main(arguments=None):
@@ -90,6 +90,8 @@ def _diagnose(wanted):
         return _said(f"interrupted; {_progress(outcome, count)}", 130)
     except run.SchedulerLost as error:
         return _said(f"--scheduler {wanted.scheduler}: {error}; {_progress(outcome, count)}", 1)
+    except store.WriteError as error:
+        return _said(f"--out {wanted.out}: {error}; {_progress(outcome, count)}", 1)
     errors = outcome.refused + int(outcome.failed.sum())
     if wanted.json:
         print(json.dumps(_json(found, outcome)))

@@ -6,6 +6,7 @@ dead, writes the same rows again; every reader takes one row for each record and
 """
 
 import hashlib
+import io
 import itertools
 import os
 import posixpath
@@ -58,6 +59,10 @@ READERS = 32
 """Parts that are read at a time: on an object store most of the time is waiting."""
 
 
+class WriteError(RuntimeError):
+    """A file of the results that cannot be written. What is there already is whole, and the next run goes on with it."""
+
+
 def addresses(out):
     """Beginnings of the addresses of the Parquet files in the folder of results ``out``."""
     return f"{out}/{TABLE}", f"{out}/{_PARTS}/"
@@ -79,14 +84,14 @@ def expect_writable(out):
 def write_part(out, rows):
     """Write rows as one part; the same rows have the same name."""
     name = hashlib.sha256("\n".join(f"{row['record']} {row['key']}" for row in rows).encode()).hexdigest()[:32]
-    with _replacing(out, f"{_PARTS}/{name}.parquet") as file:
-        parquet.write_table(pa.Table.from_pylist(rows, SCHEMA), file)
+    count = f"{len(rows)} record{'s' if len(rows) > 1 else ''}"
+    write = lambda file: parquet.write_table(pa.Table.from_pylist(rows, SCHEMA), file)
+    _write(out, f"{_PARTS}/{name}.parquet", write, f" with {count} from {rows[0]['record']}")
 
 
 def write_text(out, name, text):
     """Write a file of the results."""
-    with _replacing(out, name) as file:
-        file.write(text.encode())
+    _write(out, name, lambda file: file.write(text.encode()))
 
 
 def finished(out):
@@ -126,20 +131,23 @@ def write_table(out, records, key_of):
     fs, _ = filesystem(out)
 
     def read(part):
-        with fs.open(part, "rb") as source:
+        with readable(part, "results"), fs.open(part, "rb") as source:
             return parquet.read_table(source, schema=SCHEMA)
 
-    with ThreadPoolExecutor(READERS) as pool, _replacing(out, TABLE) as file, parquet.ParquetWriter(file, SCHEMA) as writer:
-        for start in range(0, len(records), _ROWS_AT_ONCE):
-            some = records.slice(start, _ROWS_AT_ONCE)
-            wanted = [place[name, key_of(index)] for index, name in enumerate(some["record"].to_pylist(), start)]
-            parts = list(dict.fromkeys(part for part, _ in wanted))
-            tables = list(pool.map(read, parts))
-            offsets = dict(zip(parts, itertools.accumulate(map(len, tables), initial=0)))
-            table = pa.concat_tables(tables).take([offsets[part] + row for part, row in wanted])
-            for column in ("spring", "time", "plant"):
-                table = table.set_column(SCHEMA.get_field_index(column), SCHEMA.field(column), some[column])
-            writer.write_table(table)
+    def write(file):
+        with ThreadPoolExecutor(READERS) as pool, parquet.ParquetWriter(file, SCHEMA) as writer:
+            for start in range(0, len(records), _ROWS_AT_ONCE):
+                some = records.slice(start, _ROWS_AT_ONCE)
+                wanted = [place[name, key_of(index)] for index, name in enumerate(some["record"].to_pylist(), start)]
+                parts = list(dict.fromkeys(part for part, _ in wanted))
+                tables = list(pool.map(read, parts))
+                offsets = dict(zip(parts, itertools.accumulate(map(len, tables), initial=0)))
+                table = pa.concat_tables(tables).take([offsets[part] + row for part, row in wanted])
+                for column in ("spring", "time", "plant"):
+                    table = table.set_column(SCHEMA.get_field_index(column), SCHEMA.field(column), some[column])
+                writer.write_table(table)
+
+    _write(out, TABLE, write)
 
 
 def rows(out):
@@ -169,6 +177,23 @@ def read(out):
     return pandas.DataFrame(flat, columns=[*names, "cause", "probability", "parameter", "value", "low", "high", "unit"])
 
 
+def _write(out, name, write, content=""):
+    """Write a file of the results by ``write``, which gets it open; ``content`` is what messages add to its name.
+
+    Whatever a file system's package or pyarrow raises becomes a WriteError, which takes nothing of it but its words: another process may
+    not be able to read the exception itself.
+    """
+    try:
+        with _replacing(out, name) as file:
+            write(file)
+        return
+    except BadInput:
+        raise
+    except Exception as error:
+        why = getattr(error, "strerror", None) or reason(error)
+    raise WriteError(f"{name}{content} cannot be written: {why}")
+
+
 @contextmanager
 def _replacing(out, name):
     """A file that has its name only when it is complete. On an object store the renaming is a copy, which is atomic there."""
@@ -181,10 +206,12 @@ def _replacing(out, name):
             yield file
             file.flush()
             # Only a local file has a number; there the content has to be on the disk before the name is.
-            with suppress(OSError, AttributeError):
+            with suppress(io.UnsupportedOperation, AttributeError):
                 os.fsync(file.fileno())
         fs.mv(partial, final)
     except BaseException:
-        if fs.exists(partial):
-            fs.rm(partial)
+        # What went wrong first is reported.
+        with suppress(Exception):
+            if fs.exists(partial):
+                fs.rm(partial)
         raise
