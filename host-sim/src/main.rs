@@ -126,7 +126,7 @@ mod tests {
         for (line, missing) in [
             ("vsj link", "'vsj link' requires a subcommand but one was not provided [subcommands: status,"),
             ("vsj link", "; Usage: vsj link [OPTIONS] <PORT> <COMMAND>"),
-            ("vsj export", "'vsj export' requires a subcommand but one was not provided [subcommands: c, fmu,"),
+            ("vsj export", "'vsj export' requires a subcommand but one was not provided [subcommands: c, fmu, model,"),
             ("vsj diagnose", "not provided: <DATA.csv>...; see `--help`"),
             ("vsj stair --overshoot-percent 5", "not provided: --known <KEY=PERCENT>; see `--help`"),
         ] {

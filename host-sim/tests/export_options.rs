@@ -11,6 +11,26 @@ fn vsj(arguments: &[&str], out: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// What the client in C++ sends is what the command sends.
+#[test]
+fn an_exported_model_is_the_one_that_the_command_sends() {
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
+    let folder = tempfile::tempdir().unwrap();
+    for (name, left_out) in [("paper", ""), (plant, "not run by the MCU: amplifier.delay_s, drift")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_vsj"));
+        let output =
+            command.args(["export", "model", "--json", "--plant", name, "--out"]).arg(folder.path()).output().unwrap();
+        assert!(String::from_utf8_lossy(&output.stderr).contains(left_out), "{output:?}");
+        let sent = simulation::plant_file::load(name).unwrap().wire().unwrap().payload().unwrap();
+        assert_eq!(std::fs::read(folder.path().join("model.bin")).unwrap(), sent[..]);
+        let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let identity = serde_json::to_value(link::BlockId::of(0, &sent)).unwrap();
+        for key in ["format", "length", "checksum"] {
+            assert_eq!(answer[key], identity[key], "{key}");
+        }
+    }
+}
+
 #[test]
 fn every_option_of_the_loop_changes_the_settings_for_c() {
     let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");

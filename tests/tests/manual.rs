@@ -63,7 +63,7 @@ fn the_commands_of_every_page_without_a_board_run_in_their_order() {
             "docs/getting-started.md" => {
                 &["out/stair/stair.csv", "out/diagnosis/report.html", "out/nominal/plant.toml", "out/plan/schedule.csv"]
             }
-            "docs/export.md" => &["out/fmu/vsj_both.fmi3.fmu", "out/c/vsj_settings.h"],
+            "docs/export.md" => &["out/fmu/vsj_both.fmi3.fmu", "out/c/vsj_settings.h", "out/model/model.bin"],
             _ => &[],
         };
         for file in expected {

@@ -1,6 +1,8 @@
-//! Plant files of the commands that run the tick.
+//! Plant files of the commands that run the tick or send its model.
 
 use anyhow::Result;
+use link::WireModel;
+use simulation::bad_input::BadInput;
 use simulation::plant_file::{self, PlantFile};
 
 use host_sim::output::terminal::remark;
@@ -10,6 +12,16 @@ pub(crate) fn load(name: &str) -> Result<PlantFile> {
     let file = plant_file::load(name)?;
     remark_on(name, &file);
     Ok(file)
+}
+
+/// Reads the model that an MCU runs from a plant file, and remarks on what it does not run of it, which is returned too.
+pub(crate) fn wire(name: &str) -> Result<(WireModel, Vec<String>)> {
+    let file = plant_file::load(name)?;
+    let left_out = file.left_out();
+    if !left_out.is_empty() {
+        remark(&format!("{name}: not run by the MCU: {}", left_out.join(", ")));
+    }
+    Ok((file.wire().map_err(|error| BadInput(format!("{name}: {error}")))?, left_out))
 }
 
 /// Remarks on effects that the tick does not simulate, and on a command that is no voltage.

@@ -5,9 +5,10 @@ use clap::Args;
 use host_sim::link::Failure;
 use host_sim::output::terminal::{json, print, remark};
 use link::{Reason, WireModel};
-use simulation::{BadInput, bad_input, plant_file};
+use simulation::bad_input;
 
 use super::session::Session;
+use crate::commands::plant;
 
 /// A spring whose stiffness is below this, in V, counts as settled at 0 V.
 const SETTLED_V: f64 = 1.0;
@@ -22,13 +23,7 @@ pub(super) struct Arguments {
 impl Arguments {
     /// Reads the model to be sent; `None` without a plant file.
     pub(super) fn read(&self) -> Result<Option<WireModel>> {
-        let Some(plant) = &self.plant else { return Ok(None) };
-        let file = plant_file::load(plant)?;
-        let left_out = file.left_out();
-        if !left_out.is_empty() {
-            remark(&format!("{plant}: not run by the MCU: {}", left_out.join(", ")));
-        }
-        Ok(Some(file.wire().map_err(|error| BadInput(format!("{plant}: {error}")))?))
+        self.plant.as_deref().map(|plant| plant::wire(plant).map(|(model, _)| model)).transpose()
     }
 }
 
