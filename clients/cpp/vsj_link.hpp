@@ -227,6 +227,22 @@ inline std::string fault_name(std::uint8_t code) {
     return std::string(code < 11 ? names[code] : "unknown") + " (" + std::to_string(code) + ")";
 }
 
+/// Name of the field of a model or of settings that a microcontroller refuses.
+inline const char* field_name(std::uint8_t code) {
+    static const char* const names[] = {
+        "memory.direct", "memory.thresholds_v", "memory.weights", "law.voltage_v", "law.stiffness", "leakage.share",
+        "leakage.tau_s", "relaxation.share", "relaxation.tau_s", "relaxation.weights", "relaxation.tau_high_s", "share",
+        "time_constant_s", "min_v", "max_v", "slew_v_per_s", "proportional_gain", "integral_gain_per_s", "controller",
+        "sensor", "rate_hz", "full_scale_v", "approach_s", "noise_v", "model_uncertainty", "fastest_s", "interval_s",
+        "oldest_s", "lowest_v", "highest_v", "fade_s", "host_timeout_s", "ramp_v_per_s", "missed_ticks_allowed",
+        "forget_missed_s", "monitor_tolerance_v", "max_current_a", "monitor_time_s", "discharge_time_s", "hang_ms",
+        "stall_ms", "reset_ms", "trip_on_cause", "range_v", "plant.time_constant_s", "margin.time_constant", "margin.share",
+        "margin.gain", "margin.overshoot", "adaptation.enabled", "adaptation.time_constant", "adaptation.share",
+        "adaptation.gain", "adaptation.rate_per_s", "adaptation.precision", "adaptation.excitation",
+        "tolerance.time_constant", "tolerance.share", "tolerance.gain"};
+    return code < sizeof names / sizeof *names ? names[code] : "another setting";
+}
+
 /// Unit of a desired stiffness: V of equivalent static voltage, Pa of Young's modulus, N/m at the tip.
 enum class Unit : std::uint8_t { volt, pascal, newton_per_metre };
 
@@ -388,11 +404,28 @@ struct BlockId {
             *part = static_cast<std::uint32_t>(from.number());
         return id;
     }
+
+    /// Format, length and checksum, as text.
+    std::string content() const {
+        char text[80];
+        std::snprintf(text, sizeof text, "format %u, %u bytes, CRC %08x", unsigned{format}, unsigned{length}, unsigned{checksum});
+        return text;
+    }
+    /// As `vsj link PORT model` prints it.
+    std::string text() const {
+        return number == 0 ? "the one that is built in" : "number " + std::to_string(number) + ", " + content();
+    }
 };
 
 /// What runs, and what is stored for the next start.
 struct Blocks {
     BlockId active, stored;
+};
+
+/// A row of a schedule: from this time in s on, until that of the next row, the target is this stiffness as the equivalent static
+/// voltage, in V.
+struct Step {
+    double time_s, target_v;
 };
 
 /// A serial device or a socket.
@@ -556,8 +589,6 @@ public:
         // Telemetry sent before the greeting belongs to an earlier program.
         samples_.clear();
         isolation_.reset();
-        const double beat_s = std::clamp(status_.silence_limit_s / 5.0, 0.001, 1.0);
-        beat_ = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(beat_s));
         beating_ = std::thread([this] { heartbeats(); });
     }
 
@@ -619,16 +650,46 @@ public:
         return std::exchange(reported_, {});
     }
 
-    /// The model that runs, and the one stored for the next start. `vsj link PORT model` sends another one.
+    /// The model that runs, and the one stored for the next start.
     Blocks model() { return blocks(8, 4); }
+
+    /// Sends the model in a file of `vsj export model` to be checked and stored, restarts the microcontroller, begins a session, and checks
+    /// that this model runs. Returns what runs and is stored then.
+    ///
+    /// A file with anything else is not sent. A microcontroller that is armed or has a fault, or rejects the model, keeps the old one and
+    /// does not restart. After its restart it takes its spring to be at rest: leave it disarmed until the spring has settled at 0 V.
+    /// Telemetry ends.
+    Blocks model(const std::string& path) {
+        const Bytes payload = read_model(path);
+        const Lock lock(mutex_);
+        std::uint8_t number = 0;
+        for (auto at = payload.begin(); at != payload.end();) {
+            Bytes part(at, at + std::min<std::ptrdiff_t>(part_bytes, payload.end() - at));
+            at += static_cast<std::ptrdiff_t>(part.size());
+            part.resize(part_bytes);
+            wire::Writer request;
+            request.byte(9).byte(number++).bytes.insert(request.bytes.end(), part.begin(), part.end());
+            order(request.bytes);
+        }
+        BlockId sent;
+        sent.format = payload[0];
+        sent.length = static_cast<std::uint32_t>(payload.size());
+        sent.checksum = wire::checksum(payload);
+        order(wire::Writer().byte(10).number(sent.length).number(sent.checksum).bytes);
+        restart();
+        const Blocks blocks = model();
+        if (blocks.active.content() != sent.content())
+            throw Error(port_.name() + ": the MCU has restarted and does not run what was sent as model (" + sent.content() +
+                        "): it runs " + blocks.active.text() + ", and has stored " + blocks.stored.text());
+        return blocks;
+    }
 
     /// The settings that run, and those stored for the next start. `vsj link PORT settings` shows and sends them.
     Blocks settings() { return blocks(13, 6); }
 
     /// Asks for telemetry at a rate in Hz, 0 for none; `samples` returns it.
     void stream(double rate_hz) {
-        if (rate_hz != 0 && !(rate_hz >= 0.02 && rate_hz <= 10'000))
-            throw Error(port_.name() + ": a rate of " + std::to_string(rate_hz) + " Hz; expected 0.02 to 10000");
+        if (rate_hz != 0) check_rate(rate_hz);
         const Lock lock(mutex_);
         double ticks = 0;
         if (rate_hz != 0) ticks = std::clamp(std::round(status_.rate_hz / rate_hz), 1.0, 65535.0);
@@ -673,25 +734,46 @@ public:
 
     /// All samples of a time; for endless ones use `stream` and `samples`.
     std::vector<Sample> watch(double rate_hz, Clock::duration length) {
+        check_rate(rate_hz);
         stream(rate_hz);
         std::vector<Sample> all = samples(length);
         stream(0);
         return all;
     }
 
-    /// Records to a new CSV file for `vsj diagnose`; returns the number of rows. An error while recording removes it.
+    /// Records to a new CSV file for `vsj diagnose`; returns the number of rows. An error while recording removes it, such as a restart of
+    /// the microcontroller.
     std::size_t record(const std::string& path, double rate_hz, Clock::duration length) {
+        return record(path, rate_hz, {}, std::chrono::duration<double>(length).count());
+    }
+
+    /// Records while an armed microcontroller is commanded the targets of a schedule, whose times increase; the first row is due at the
+    /// start. The time of the last row is the end, unless `seconds` is longer. A recording in which the microcontroller is disarmed or has a
+    /// fault ends with an error.
+    std::size_t record(const std::string& path, double rate_hz, const std::vector<Step>& schedule,
+                       std::optional<double> seconds = std::nullopt) {
+        check_rate(rate_hz);
+        const double end_s = check_schedule(schedule);
+        if (schedule.empty() && !seconds) throw Error("record: neither seconds nor a schedule; expected one of them");
+        if (seconds && !(*seconds > 0)) throw Error("seconds " + text(*seconds) + ": expected a positive number of seconds");
+        const Status before = status();
+        for (const Step& step : schedule)
+            if (!(step.target_v >= before.lowest_v && step.target_v <= before.highest_v))
+                throw Error("schedule: " + text(step.target_v) + " V; expected " + text(before.lowest_v) + " to " +
+                            text(before.highest_v) + " V, what is in reach");
         std::FILE* file = std::fopen(path.c_str(), "wx");
         if (file == nullptr) throw Error(path + ": cannot be created: " + std::strerror(errno));
         std::vector<Sample> rows;
         try {
-            rows = watch(rate_hz, length);
+            rows = follow(rate_hz, schedule, std::max(seconds.value_or(end_s), end_s));
         } catch (...) {
             std::fclose(file);
             std::remove(path.c_str());
             throw;
         }
-        const bool has_sensor = std::any_of(rows.begin(), rows.end(), [](auto& row) { return row.measured_v.has_value(); });
+        const bool has_sensor =
+            before.sample.measured_v.has_value() ||
+            std::any_of(rows.begin(), rows.end(), [](auto& row) { return row.measured_v.has_value(); });
         std::fprintf(file, "# recorded over the serial link; stiffness %s\ntime_s,voltage_v,%s\n",
                      has_sensor ? "as measured by the sensor" : "as estimated by the controller: no measurement",
                      has_sensor ? "stiffness" : "estimate");
@@ -715,6 +797,13 @@ private:
     struct NoSession : Error {
         using Error::Error;
     };
+    /// One that was refused because the microcontroller has restarted.
+    struct Restarted : NoSession {
+        using NoSession::NoSession;
+    };
+    /// Format of a model, the most bytes of one, and the bytes in each part in which it is sent.
+    static constexpr std::uint8_t model_format = 1;
+    static constexpr std::size_t most_model_bytes = 416, part_bytes = 32;
     /// A request is repeated after this time.
     static constexpr std::chrono::milliseconds each{100};
     /// Number of times that a request at the end is sent at most.
@@ -739,7 +828,6 @@ private:
     /// Numbers of the reports of faults whose receipt the microcontroller does not know of yet.
     std::set<std::uint32_t> unheard_;
     std::vector<Fault> reported_;
-    Clock::duration beat_{};
     /// When the last request was begun.
     Clock::time_point heard_ = Clock::now();
     std::mutex closing_lock_;
@@ -749,10 +837,12 @@ private:
 
     void heartbeats() {
         std::unique_lock<std::mutex> guard(closing_lock_);
-        while (!wake_.wait_for(guard, beat_ / 4, [this] { return closing_; })) {
+        Clock::duration pause{};
+        while (!wake_.wait_for(guard, pause, [this] { return closing_; })) {
             guard.unlock();
             try {
                 const Lock lock(mutex_);
+                pause = beat() / 4;
                 beat_if_due();
             } catch (const Error&) {
                 // The next call meets the same.
@@ -761,8 +851,14 @@ private:
         }
     }
 
+    /// Time from the beginning of one heartbeat to that of the next.
+    Clock::duration beat() const {
+        const std::chrono::duration<double> beat_s(std::clamp(status_.silence_limit_s / 5.0, 0.001, 1.0));
+        return std::chrono::duration_cast<Clock::duration>(beat_s);
+    }
+
     void beat_if_due() {
-        if (beat_.count() > 0 && Clock::now() - heard_ >= beat_) order({6});
+        if (Clock::now() - heard_ >= beat()) order({6});
     }
 
     /// A request that is answered with the state and the target.
@@ -802,6 +898,87 @@ private:
         requests_ = 0;
         // One that came before the answer belongs to the session before.
         isolation_.reset();
+    }
+
+    /// Restarts the microcontroller and asks it for a new session. It then numbers its reports of faults from 1 again, so that those
+    /// received before are not confirmed to it any more.
+    void restart() {
+        try {
+            exchange({11});
+        } catch (const Restarted&) {
+            // The answer was lost, so that the request came again, to a microcontroller that has restarted.
+        }
+        every_ticks_ = 0;
+        begin();
+        unheard_.clear();
+    }
+
+    /// The bytes of a model.
+    static Bytes read_model(const std::string& path) {
+        Bytes payload(most_model_bytes + 1);
+        std::FILE* file = std::fopen(path.c_str(), "rb");
+        if (file != nullptr) payload.resize(std::fread(payload.data(), 1, payload.size(), file));
+        const bool is_read = file != nullptr && std::ferror(file) == 0;
+        const int error = errno;
+        if (file != nullptr) std::fclose(file);
+        if (!is_read) throw Error(path + ": cannot be read: " + std::strerror(error));
+        if (payload.empty() || payload.size() > most_model_bytes || payload[0] != model_format)
+            throw Error(path + ": not a model of format " + std::to_string(model_format) + "; expected a file of `vsj export model`");
+        return payload;
+    }
+
+    static std::string text(double number) {
+        char digits[40];
+        std::snprintf(digits, sizeof digits, "%g", number);
+        return digits;
+    }
+
+    void check_rate(double rate_hz) const {
+        if (!(rate_hz >= 0.02 && rate_hz <= 10'000))
+            throw Error(port_.name() + ": a rate of " + text(rate_hz) + " Hz; expected 0.02 to 10000");
+    }
+
+    /// Checks a schedule; returns its length in s.
+    static double check_schedule(const std::vector<Step>& schedule) {
+        for (std::size_t at = 0; at < schedule.size(); ++at) {
+            if (!(std::isfinite(schedule[at].time_s) && std::isfinite(schedule[at].target_v)))
+                throw Error("schedule: a number that is not finite; expected times in s and voltages in V");
+            if (at > 0 && !(schedule[at].time_s > schedule[at - 1].time_s))
+                throw Error("schedule: times that do not increase; expected increasing times in s");
+        }
+        return schedule.empty() ? 0 : schedule.back().time_s - schedule.front().time_s;
+    }
+
+    /// The samples of a time in s, in which the targets of a schedule are commanded.
+    std::vector<Sample> follow(double rate_hz, const std::vector<Step>& schedule, double length_s) {
+        std::vector<Sample> rows;
+        auto next = schedule.begin();
+        stream(rate_hz);
+        try {
+            const auto start = Clock::now();
+            const auto elapsed_s = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+            for (double now_s = 0; now_s < length_s; now_s = elapsed_s()) {
+                const Step* due = nullptr;
+                for (; next != schedule.end() && now_s >= next->time_s - schedule.front().time_s; ++next) due = &*next;
+                if (due != nullptr) set(due->target_v);
+                const auto arrived = samples(std::chrono::milliseconds(5));
+                if (arrived.empty()) continue;
+                rows.insert(rows.end(), arrived.begin(), arrived.end());
+                const Sample& last = rows.back();
+                if (!schedule.empty() && last.state != State::armed && last.state != State::ramping)
+                    throw Error(port_.name() + ": no longer armed: the MCU is " + name(last.state) + " at " + text(last.time_s) + " s");
+                if (last.tick < rows.front().tick) throw Error(port_.name() + ": the MCU restarted during the recording");
+            }
+        } catch (...) {
+            try {
+                stream(0);
+            } catch (const Error&) {
+                // What went wrong before is reported.
+            }
+            throw;
+        }
+        stream(0);
+        return rows;
     }
 
     /// A request of the session, after what it needs.
@@ -904,9 +1081,7 @@ private:
         const auto code = from.number();
         const auto range = [&] {
             const double lowest = from.real(), highest = from.real();
-            char text[80];
-            std::snprintf(text, sizeof text, "%g to %g", lowest, highest);
-            return std::string(text);
+            return text(lowest) + " to " + text(highest);
         };
         std::string why;
         switch (code) {
@@ -925,6 +1100,14 @@ private:
             case 9: why = "a different fault is present: " + fault_name(from.byte()); break;
             case 10: why = "the host was silent for too long"; break;
             case 11: why = "armed; disarm it first"; break;
+            case 12: why = "a part is missing; expected part " + std::to_string(from.byte()); break;
+            case 13: why = "it arrived damaged, or the MCU does not know its format"; break;
+            case 14: {
+                const std::string field = field_name(from.byte());
+                why = "the model cannot be run: " + field + " has to lie within " + range();
+                break;
+            }
+            case 15: why = "the flash could not be written; what it held before stays"; break;
             case 16: why = "the amplifier is off, and its monitors still show a voltage or a current"; break;
             case 17: why = "the cause of the fault is still there: " + fault_name(from.byte()); break;
             case 18: why = "the MCU is in a session with another program"; break;
@@ -932,7 +1115,8 @@ private:
             default: why = "reason " + std::to_string(code) + " of docs/link.md"; break;
         }
         const std::string refusal = port_.name() + ": refused: " + why;
-        if (code == 4 || code == 18) throw NoSession(refusal);
+        if (code == 4) throw Restarted(refusal);
+        if (code == 18) throw NoSession(refusal);
         throw Error(refusal);
     }
 };

@@ -27,6 +27,18 @@ fn a_field_keeps_its_name_across_the_link() {
     assert_eq!(Field::named("no such field"), Field::OTHER);
 }
 
+/// The client in C++ has the names in the order of their codes.
+#[test]
+fn a_field_has_the_same_name_in_the_header_for_cpp() {
+    let header = include_str!("../../clients/cpp/vsj_link.hpp");
+    let (_, list) = header.split_once("field_name(std::uint8_t code) {").unwrap();
+    let (list, _) = list.split_once("};").unwrap();
+    let listed: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
+    let names: Vec<&str> =
+        (0..=u8::MAX).map(|code| Field(code).name()).take_while(|name| *name != "another setting").collect();
+    assert_eq!(listed, names);
+}
+
 /// A field without a code would be refused as `another setting`.
 #[test]
 fn every_field_of_the_settings_that_a_check_can_name_has_a_code() {

@@ -240,6 +240,8 @@ def test_a_recording_ends_with_the_schedule_unless_it_is_longer(mcu, seconds, le
         assert length_s <= time.monotonic() - begin < length_s + 5
         with pytest.raises(vsj.BadInput, match="seconds -1: expected a positive number"):
             link.record(schedule=[(0, 0), (0.2, 0)], seconds=-1)
+        with pytest.raises(vsj.BadInput, match="rate_hz 0: expected 0.02 to 10000"):
+            link.record(seconds=1, rate_hz=0)
     # The last row of a schedule is a target only if something follows.
     assert mcu.ended()[SET] >= 2
 

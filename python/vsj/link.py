@@ -302,7 +302,11 @@ class Link:
 
     def _turns(self, rate_hz: float, length_s: float, command: Callable[[float], None]) -> Iterator[List[Sample]]:
         """Samples in short turns, each after ``command``, which gets the time since the first turn in s."""
-        self._port.stream(number("rate_hz", rate_hz))
+        rate = number("rate_hz", rate_hz)
+        if rate == 0:
+            # To the port that is the end of the telemetry.
+            raise _vsj.BadInput("rate_hz 0: expected 0.02 to 10000")
+        self._port.stream(rate)
         begin = time.monotonic()
         try:
             while (elapsed_s := time.monotonic() - begin) < length_s:

@@ -8,8 +8,8 @@
 #include "expect.hpp"
 
 int main(int argc, char** argv) {
-    if (argc != 3) return 2;
-    const std::string port = argv[1], file = argv[2];
+    if (argc != 4) return 2;
+    const std::string port = argv[1], file = argv[2], model = argv[3];
     const auto patience = std::chrono::seconds(5);
     expect(contains(error_of([] { vsj::Link link("unix:/nonexistent"); }), "cannot be opened"), "an error of the port");
     {
@@ -38,5 +38,25 @@ int main(int argc, char** argv) {
     }
     vsj::Link link(port, 115'200, patience);
     expect(link.status().sample.state == vsj::State::disarmed, "disarmed by the destructor");
-    std::puts("armed, set, kept, watched, recorded, disarmed");
+    const std::vector<vsj::Step> schedule{{0, 200}, {0.2, 0}, {0.4, 0}};
+    expect(contains(error_of([&] { link.record(file + ".new", 100, schedule); }), "refused: not armed"), "a schedule without arming");
+    expect(contains(error_of([&] { link.record(file + ".new", 100, {{0, 100}, {1, 5000}}); }), "5000 V; expected 0 to 700 V"), "a bound");
+    link.arm();
+    expect(link.record(file + ".new", 100, schedule) > 30, "rows of a schedule, after errors without a file");
+    expect(link.status().sample.target_v == 0.0, "the targets of the schedule");
+    std::thread disarming([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        link.disarm();
+    });
+    const auto disarmed = error_of([&] { link.record(file + ".other", 100, {{0, 100}, {60, 0}}); });
+    disarming.join();
+    expect(contains(disarmed, "no longer armed: the MCU is disarmed"), "a recording that ends with the output");
+    link.arm();
+    expect(contains(error_of([&] { link.model(model); }), "refused: armed; disarm it first"), "no model while armed");
+    link.disarm();
+    expect(link.model().stored.number == 0, "the old model after a refusal");
+    const vsj::Blocks models = link.model(model);
+    expect(models.active.number == 1 && models.stored.text() == models.active.text(), "the model that was sent");
+    expect(link.arm() == vsj::State::armed && link.set(300) == 300.0, "armed with the model");
+    std::puts("armed, set, kept, watched, recorded, with a schedule too, disarmed, another model run");
 }

@@ -5,6 +5,8 @@
 #include <csignal>
 #include <functional>
 #include <iostream>
+#include <optional>
+#include <tuple>
 
 #include <sys/time.h>
 
@@ -17,7 +19,8 @@ namespace {
 using vsj::Bytes;
 using vsj::wire::Writer;
 
-constexpr std::uint8_t hello = 0, ask_status = 1, set = 2, disarm = 4, heartbeat = 6, stream = 7, heard = 12;
+constexpr std::uint8_t hello = 0, ask_status = 1, set = 2, disarm = 4, heartbeat = 6, stream = 7, ask_model = 8, model_part = 9,
+                       model_end = 10, restart = 11, heard = 12;
 
 Writer& sample(Writer& message, std::uint64_t tick) {
     message.number(tick);
@@ -43,6 +46,8 @@ public:
     std::atomic<bool> is_of_another_session{false};
     /// True if nothing is answered.
     std::atomic<bool> is_mute{false};
+    /// The reply to a request in place of the usual one, none if it is empty.
+    std::function<std::optional<Bytes>(const Bytes&)> instead;
 
     explicit Mcu(std::function<Bytes(const Bytes&)> before = {}) : before_(std::move(before)) {}
     ~Mcu() { thread_.join(); }
@@ -81,6 +86,8 @@ private:
         Bytes reply{0, 0, 0};
         if (code == hello || code == ask_status) reply = status(60'000);
         if (code != hello && is_of_another_session) reply = {1, 18};
+        if (instead) reply = instead(request.message).value_or(reply);
+        if (reply.empty()) return;
         Bytes out = before_ ? before_(request.message) : Bytes{};
         const Bytes frame = vsj::wire::frame(vsj::wire::reply_kind, request.sequence, reply, nonce_);
         out.insert(out.end(), frame.begin(), frame.end());
@@ -298,6 +305,166 @@ void waits_that_are_interrupted() {
     for (const int file : others) ::close(file);
 }
 
+/// A file of this program that is removed at its end.
+struct File {
+    std::string path = "/tmp/vsj-host-" + std::to_string(::getpid());
+
+    explicit File(const Bytes& content) {
+        std::FILE* file = std::fopen(path.c_str(), "wb");
+        std::fwrite(content.data(), 1, content.size(), file);
+        std::fclose(file);
+    }
+    ~File() { std::remove(path.c_str()); }
+};
+
+/// An MCU that takes models, with the replies of a healthy one.
+struct Store {
+    Bytes received, stored, active;
+    std::uint32_t number = 0;
+
+    std::optional<Bytes> reply(const Bytes& request) {
+        if (request[0] == model_part) {
+            if (request.size() != 34) return Bytes{1, 7};
+            if (request[1] == 0) received.clear();
+            if (received.size() != 32u * request[1]) return Bytes{1, 12, 0};
+            received.insert(received.end(), request.begin() + 2, request.end());
+        } else if (request[0] == model_end) {
+            vsj::wire::Reader from(request);
+            from.byte();
+            const std::uint64_t length = from.number(), checksum = from.number();
+            const bool is_padded = length <= received.size() && received.size() < length + 32 &&
+                                   std::all_of(received.begin() + static_cast<std::ptrdiff_t>(length), received.end(),
+                                               [](std::uint8_t byte) { return byte == 0; });
+            if (!is_padded) return Bytes{1, 13};
+            received.resize(length);
+            if (vsj::wire::checksum(received) != checksum) return Bytes{1, 13};
+            stored = received;
+            ++number;
+        } else if (request[0] == restart) {
+            active = stored;
+        } else if (request[0] == ask_model) {
+            Writer message;
+            message.byte(4);
+            for (const Bytes& block : {active, stored}) {
+                message.number(block.empty() ? 0 : number).byte(block.empty() ? 0 : block[0]).number(block.size());
+                message.number(block.empty() ? 0 : vsj::wire::checksum(block));
+            }
+            return message.bytes;
+        }
+        return std::nullopt;
+    }
+};
+
+Bytes model_of(std::size_t length) {
+    Bytes model{1};
+    while (model.size() < length) model.push_back(static_cast<std::uint8_t>(model.size()));
+    return model;
+}
+
+/// All bytes arrive, however many parts they take, and also if the answer to the restart is lost.
+void models_of_every_length() {
+    for (const std::size_t length : {1u, 31u, 32u, 33u, 416u}) {
+        const File file(model_of(length));
+        Store store;
+        Mcu mcu;
+        mcu.instead = [&](const Bytes& request) -> std::optional<Bytes> {
+            if (request[0] == restart && std::exchange(store.active, store.stored) != store.stored) return Bytes{};
+            if (request[0] == restart) return Bytes{1, 4};
+            return store.reply(request);
+        };
+        with_link(mcu, [&](vsj::Link& link) {
+            expect(link.model().active.number == 0, "what is built in");
+            const vsj::Blocks blocks = link.model(file.path);
+            expect(blocks.active.number == 1 && blocks.active.length == length, "a model that runs");
+        });
+        expect(store.active == model_of(length), "the bytes of the file");
+        expect(mcu.asked[hello] == 2 && mcu.asked[model_part] == (length + 31) / 32, "a session after the restart");
+    }
+}
+
+/// What is refused changes nothing, and another model that runs is an error.
+void models_that_do_not_run() {
+    const File file(model_of(70));
+    Store store;
+    Mcu mcu;
+    Bytes refusal;
+    std::uint8_t refused = 255;
+    mcu.instead = [&](const Bytes& request) { return request[0] == refused ? refusal : store.reply(request); };
+    with_link(mcu, [&](vsj::Link& link) {
+        const auto error = [&](std::uint8_t code, const Bytes& answer) {
+            refused = code;
+            refusal = answer;
+            return error_of([&] { link.model(file.path); });
+        };
+        Bytes bounds = Writer().byte(1).byte(14).byte(5).real(0).real(1).bytes;
+        expect(contains(error(model_end, bounds), "refused: the model cannot be run: leakage.share has to lie within 0 to 1"), "a field");
+        bounds[2] = 200;
+        expect(contains(error(model_end, bounds), "cannot be run: another setting has to lie within 0 to 1"), "a newer field");
+        expect(contains(error(model_part, {1, 11}), "refused: armed; disarm it first"), "an armed MCU");
+        expect(contains(error(model_part, {1, 12, 3}), "expected part 3"), "another part");
+        expect(contains(error(model_end, {1, 13}), "arrived damaged"), "damage");
+        expect(contains(error(model_end, {1, 15}), "flash could not be written"), "a flash that fails");
+        expect(mcu.asked[restart] == 0, "no restart");
+        expect(contains(error(restart, {1, 18}), "in a session with another program"), "a session of another program");
+        const auto forgotten = error(restart, {0, 0, 0});
+        expect(contains(forgotten, "does not run what was sent as model (format 1, 70 bytes, CRC ") &&
+                   contains(forgotten, "it runs the one that is built in, and has stored number 2, format 1, 70 bytes, CRC "),
+               "an MCU that forgets: " + forgotten);
+        const unsigned parts = mcu.asked[model_part];
+        for (const Bytes& other : {Bytes{}, Bytes{'#'}, model_of(417)}) {
+            const File wrong(other);
+            expect(contains(error_of([&] { link.model(wrong.path); }), "not a model of format 1; expected a file of"), "no model");
+        }
+        expect(contains(error_of([&] { link.model("/nonexistent"); }), "/nonexistent: cannot be read: No such file"), "no file");
+        expect(contains(error_of([&] { link.model("/tmp"); }), "/tmp: cannot be read: Is a directory"), "a folder");
+        expect(mcu.asked[model_part] == parts, "nothing sent");
+    });
+}
+
+/// What is no recording is refused before the file is made, and one that breaks off leaves none.
+void recordings_that_break_off() {
+    const std::string path = "/tmp/vsj-host-" + std::to_string(::getpid()) + ".csv";
+    std::vector<std::uint64_t> ticks;
+    Mcu mcu([&](const Bytes& request) {
+        Bytes out;
+        for (const auto tick : request[0] == stream && request[1] != 0 ? ticks : std::vector<std::uint64_t>()) {
+            Writer message;
+            const Bytes frame = vsj::wire::frame(vsj::wire::reply_kind, 0, sample(message.byte(3), tick).bytes, 1);
+            out.insert(out.end(), frame.begin(), frame.end());
+        }
+        return out;
+    });
+    with_link(mcu, [&](vsj::Link& link) {
+        using Schedule = std::vector<vsj::Step>;
+        for (const auto& [schedule, seconds, words] : {
+                 std::tuple(Schedule(), std::optional<double>(), "neither seconds nor a schedule; expected one of them"),
+                 std::tuple(Schedule(), std::optional(-1.0), "seconds -1: expected a positive number of seconds"),
+                 std::tuple(Schedule(), std::optional<double>(NAN), "nan: expected a positive number of seconds"),
+                 std::tuple(Schedule{{0, 0}, {0, 0}}, std::optional<double>(), "times that do not increase"),
+                 std::tuple(Schedule{{0, 0}, {1, NAN}}, std::optional<double>(), "not finite"),
+                 std::tuple(Schedule{{0, 0}, {1, 300}}, std::optional<double>(), "300 V; expected 0 to 0 V, what is in reach"),
+             })
+            expect(contains(error_of([&] { link.record(path, 100, schedule, seconds); }), words), words);
+        expect(contains(error_of([&] { link.record(path, 0, std::chrono::seconds(1)); }), "a rate of 0 Hz; expected 0.02"), "a rate");
+        expect(contains(error_of([&] { link.watch(0, std::chrono::seconds(1)); }), "a rate of 0 Hz; expected 0.02"), "a rate");
+        expect(mcu.asked[stream] == 0 && mcu.asked[set] == 0, "nothing asked for");
+        ticks = {100, 110};
+        expect(link.record(path, 100, std::chrono::milliseconds(50)) == 2 && std::remove(path.c_str()) == 0, "a recording");
+        ticks = {100, 3};
+        expect(contains(error_of([&] { link.record(path, 100, std::chrono::seconds(20)); }), "restarted during the recording"), "a restart");
+        ticks = {100};
+        const auto failure = error_of([&] { link.record(path, 100, {{0, 0}, {20, 0}}); });
+        expect(contains(failure, "no longer armed: the MCU is disarmed at 0.1 s"), "a disarmed MCU: " + failure);
+        expect(mcu.asked[set] == 1 && mcu.asked[stream] == 6, "a target, and telemetry ended each time");
+        expect(std::remove(path.c_str()) != 0, "no file");
+        ticks = {};
+        const auto begin = std::chrono::steady_clock::now();
+        expect(link.record(path, 100, {{7, 0}, {7.1, 0}, {7.2, 0}}, 0.3) == 0 && std::remove(path.c_str()) == 0, "no rows");
+        expect(std::chrono::steady_clock::now() - begin >= std::chrono::milliseconds(300), "the longer of both");
+        expect(mcu.asked[set] == 4, "the last row is a target if something follows");
+    });
+}
+
 /// What is no number does not reach the microcontroller.
 void targets_that_are_no_numbers() {
     Mcu mcu;
@@ -347,6 +514,9 @@ int main() {
     samples_that_nobody_takes();
     output_of_another_program();
     end_while_nothing_is_answered();
+    models_of_every_length();
+    models_that_do_not_run();
+    recordings_that_break_off();
     numbers_that_run_out();
-    std::puts("waits ended by no signal, targets that are no numbers refused, dropped samples counted, another program's output left, an end without answers, a session renewed, a serial device set, every address tried");
+    std::puts("models sent, recordings ended, waits ended by no signal, targets that are no numbers refused, dropped samples counted, another program's output left, an end without answers, a session renewed, a serial device set, every address tried");
 }
