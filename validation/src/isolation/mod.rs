@@ -16,7 +16,7 @@ pub use false_alarms::{Alarms, Watch, predicted_per_block};
 pub use fault::{Fault, SIZES};
 pub use least_squares::Thresholds;
 pub use page::{TITLE, page};
-pub use run::{Decision, Outcome, Size, run};
+pub use run::{Decision, Outcome, Size, reported, run};
 pub use tables::{Row, rows, sizes, summary, table};
 
 /// Standard deviations of the noise in the tables, in percent of 500 V.

@@ -12,6 +12,8 @@ use crate::ground_truth::{Effect, Live};
 
 /// Length of a run, in s.
 pub(super) const RUN_S: f64 = 180.0;
+/// Number of ticks of a run.
+const TICKS: u32 = (RUN_S * RATE_HZ) as u32;
 /// Ratio of the sizes of two faults whose readings give the sensitivity to the size.
 const CHANGED: f64 = 1.01;
 /// Time for which the rival may settle, in s; no fault begins before.
@@ -47,6 +49,9 @@ pub struct Outcome {
     pub isolable_s: Option<f64>,
     /// The size that is reported at the end, if the name is right.
     pub size: Option<Size>,
+    /// Half width of the 95 % interval of an unbiased estimate from all readings since the fault began that knows all but the size
+    /// (Cramer and Rao), in the unit of the cause; `None` for one that has no other size than 1.
+    pub least_half_width: Option<f64>,
     /// Decision at the end of the run.
     pub last: Decision,
     /// True if the decision at the end is ambiguous, and the right name is one of the two.
@@ -68,9 +73,6 @@ pub struct Size {
     pub error: f64,
     /// Half width of the reported 95 % interval.
     pub half_width: f64,
-    /// Half width of the 95 % interval of an unbiased estimate from all readings since the fault began that knows all but the size
-    /// (Cramer and Rao).
-    pub least_half_width: f64,
 }
 
 fn decision(verdict: Verdict, fault: Fault) -> Decision {
@@ -123,16 +125,8 @@ pub(super) fn run_with(
     seed: u64,
     thresholds: &Thresholds,
 ) -> Result<Outcome, OutOfRange> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let effect = fault.effect(&mut random, size);
-    let onset_s = random.random_range(SETTLED_S..2.0 * SETTLED_S);
-    let targets = targets(&mut random);
-    let ticks = (RUN_S * RATE_HZ) as u32;
+    let mut scene = Scene::new(known, fault, size, percent, seed)?;
     let alarm_nats = Settings::PAPER.alarm_nats;
-    let mut watched = Watched::new(percent, alarm_nats, known.tolerance, seed, ticks)?;
-    if !known.errors.is_empty() {
-        watched.change(&known.errors);
-    }
     let mut rival = LeastSquares::new(bank::block_ticks(RATE_HZ), RATE_HZ);
     let mut outcome = Outcome {
         alarm_s: None,
@@ -140,6 +134,7 @@ pub(super) fn run_with(
         first: None,
         isolable_s: None,
         size: None,
+        least_half_width: None,
         last: Decision::Quiet,
         one_of_two: false,
         rival_s: None,
@@ -147,46 +142,34 @@ pub(super) fn run_with(
         deviations: [0.0; 3],
     };
     // For the limits: the bank without noise, and a spring under the same voltage with a slightly different size of the fault.
-    let mut exact = watched.reference();
-    let changed = effect.as_ref().map(|effect| effect.at(CHANGED * effect.size));
+    let mut exact = scene.watched.reference();
+    let changed = scene.effect.as_ref().map(|effect| effect.at(CHANGED * effect.size));
     let mut other: Option<Live> = None;
-    let mut information = 0.0;
-    let (mut begun, mut at, mut nats) = (false, 0, 0.0);
-    for tick in 0..ticks {
-        let now_s = f64::from(tick) / RATE_HZ;
-        if now_s >= onset_s && !begun {
-            begun = true;
-            let effects: Vec<Effect> = known.errors.iter().cloned().chain(effect.clone()).collect();
-            watched.change(&effects);
-            watched.stuck = fault == Fault::Stuck;
+    let (mut information, mut nats) = (0.0, 0.0);
+    for tick in 0..TICKS {
+        if scene.begins(tick) {
             exact.start();
-            let effects: Vec<Effect> = known.errors.iter().cloned().chain(changed.clone()).collect();
-            other = Some(watched.with(&effects));
+            other = Some(scene.watched.with(&with(known, &changed)));
         }
-        while targets[at].0 < now_s {
-            at += 1;
-        }
-        let Tick { applied, model, read, expected } = watched.tick(Volts::new(targets[at].1)?)?;
+        let Tick { applied, model, read, expected } = scene.tick(tick)?;
+        let (now_s, since_s) = (f64::from(tick) / RATE_HZ, scene.since_s(tick));
         let ends_block = rival.tick(applied, read);
         if ends_block && now_s > SETTLED_S {
             let off = rival.deviations();
             outcome.deviations = std::array::from_fn(|i| outcome.deviations[i].max(off[i].abs()));
         }
-        let since_s = now_s - onset_s;
         // Repeated where the reading is.
         exact.tick(applied, model, Some(expected + 1e-9 * (read - expected)));
         if let Some(other) = &mut other {
             let (_, changed) = other.hold(applied, 1.0 / RATE_HZ);
-            information += ((changed.expected - expected) / watched.noise_v).powi(2);
-        }
-        if begun {
+            information += ((changed.expected - expected) / scene.watched.noise_v).powi(2);
             if outcome.isolable_s.is_none()
                 && ends_block
                 && fault.cause().is_some_and(|cause| exact.excludes_others(cause))
             {
                 outcome.isolable_s = Some(since_s);
             }
-            nats += 0.5 * ((expected - model) / watched.noise_v).powi(2);
+            nats += 0.5 * ((expected - model) / scene.watched.noise_v).powi(2);
             if outcome.limit_s.is_none() && nats >= alarm_nats {
                 outcome.limit_s = Some(since_s);
             }
@@ -197,7 +180,7 @@ pub(super) fn run_with(
                 (outcome.rival_s, outcome.rival_right) = (Some(since_s), name == fault.name());
             }
         }
-        let verdict = watched.verdict();
+        let verdict = scene.watched.verdict();
         if verdict != Verdict::Quiet && outcome.alarm_s.is_none() {
             outcome.alarm_s = Some(since_s);
         }
@@ -205,20 +188,93 @@ pub(super) fn run_with(
             outcome.first = Some((since_s, decision(verdict, fault) == Decision::Right));
         }
     }
-    let verdict = watched.verdict();
+    let verdict = scene.watched.verdict();
     outcome.last = decision(verdict, fault);
-    if let (Decision::Right, Some(found)) = (outcome.last, watched.finding()) {
-        let range_v = Settings::PAPER.range_v;
-        let size = |effect: &Option<Effect>| effect.as_ref().and_then(|effect| fault.size(effect, range_v));
-        outcome.size = size(&effect).zip(size(&changed)).map(|(truth, changed)| Size {
-            truth,
-            error: found.size - truth,
-            half_width: found.half_width,
-            least_half_width: 1.96 * (changed - truth).abs() / information.sqrt(),
-        });
-    }
+    outcome.size = scene.size();
+    let truth = |effect: &Option<Effect>| fault.size(effect.as_ref()?, Settings::PAPER.range_v);
+    outcome.least_half_width = truth(&scene.effect)
+        .zip(truth(&changed))
+        .map(|(truth, changed)| 1.96 * (changed - truth).abs() / information.sqrt());
     outcome.one_of_two = matches!(verdict, Verdict::Ambiguous(a, b) if [a.name(), b.name()].contains(&fault.name()));
     Ok(outcome)
+}
+
+/// Does what [`run`] does without its limits and its rival, which take most of the time. Returns the size that is reported at the end if
+/// the name is right.
+///
+/// # Errors
+/// The model rejects the settings.
+pub fn reported(fault: Fault, size: f64, percent: f64, seed: u64) -> Result<Option<Size>, OutOfRange> {
+    let mut scene = Scene::new(&Known::default(), fault, size, percent, seed)?;
+    for tick in 0..TICKS {
+        scene.tick(tick)?;
+    }
+    Ok(scene.size())
+}
+
+/// The effects of a spring that is `known`, and the fault.
+fn with(known: &Known, fault: &Option<Effect>) -> Vec<Effect> {
+    known.errors.iter().chain(fault).cloned().collect()
+}
+
+/// The controller, its targets, the spring in which the fault begins, and the bank.
+struct Scene {
+    fault: Fault,
+    /// The fault's effect on the spring or its sensor, if it has one.
+    effect: Option<Effect>,
+    /// The effects of the spring from the beginning of the fault on.
+    faulty: Vec<Effect>,
+    watched: Watched,
+    onset_s: f64,
+    targets: Vec<(f64, f64)>,
+    /// Number of targets that are over.
+    past: usize,
+}
+
+impl Scene {
+    /// A scene before its first tick.
+    fn new(known: &Known, fault: Fault, size: f64, percent: f64, seed: u64) -> Result<Self, OutOfRange> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let effect = fault.effect(&mut random, size);
+        let onset_s = random.random_range(SETTLED_S..2.0 * SETTLED_S);
+        let targets = targets(&mut random);
+        let mut watched = Watched::new(percent, Settings::PAPER.alarm_nats, known.tolerance, seed, TICKS)?;
+        if !known.errors.is_empty() {
+            watched.change(&known.errors);
+        }
+        let faulty = with(known, &effect);
+        Ok(Self { fault, effect, faulty, watched, onset_s, targets, past: 0 })
+    }
+
+    /// Time since the fault began, in s, at the beginning of a tick.
+    fn since_s(&self, tick: u32) -> f64 {
+        f64::from(tick) / RATE_HZ - self.onset_s
+    }
+
+    /// True if the fault begins with this tick.
+    fn begins(&self, tick: u32) -> bool {
+        tick == (self.onset_s * RATE_HZ).ceil() as u32
+    }
+
+    /// Runs a tick.
+    fn tick(&mut self, tick: u32) -> Result<Tick, OutOfRange> {
+        if self.begins(tick) {
+            self.watched.change(&self.faulty);
+            self.watched.stuck = self.fault == Fault::Stuck;
+        }
+        while self.targets[self.past].0 < f64::from(tick) / RATE_HZ {
+            self.past += 1;
+        }
+        self.watched.tick(Volts::new(self.targets[self.past].1)?)
+    }
+
+    /// The size that the bank reports, if it has named the fault.
+    fn size(&self) -> Option<Size> {
+        let found =
+            self.watched.finding().filter(|_| decision(self.watched.verdict(), self.fault) == Decision::Right)?;
+        let truth = self.fault.size(self.effect.as_ref()?, Settings::PAPER.range_v)?;
+        Some(Size { truth, error: found.size - truth, half_width: found.half_width })
+    }
 }
 
 #[cfg(test)]
@@ -232,12 +288,13 @@ mod tests {
         let open = Thresholds([f64::INFINITY; 3]);
         for (cause, percent) in [(Cause::GainError, 0.2), (Cause::TimeConstant, 1.0), (Cause::Delay, 0.2)] {
             let fault = Fault::Effect(cause);
-            let Outcome { first, isolable_s, size, last, .. } = run(fault, 0.5, percent, 1, &open).unwrap();
+            let Outcome { first, isolable_s, size, least_half_width, last, .. } =
+                run(fault, 0.5, percent, 1, &open).unwrap();
             let (first_s, isolable_s, size) = (first.unwrap().0, isolable_s.unwrap(), size.unwrap());
             println!("{cause}: name after {first_s} s, limit {isolable_s} s, {size:?}");
             assert_eq!(last, Decision::Right, "{cause}");
             assert!(isolable_s > 0.0 && isolable_s <= first_s, "{cause}: name after {first_s} s, limit {isolable_s} s");
-            let Size { truth, error, half_width, least_half_width } = size;
+            let (Size { truth, error, half_width }, least_half_width) = (size, least_half_width.unwrap());
             assert!(error.abs() < 0.2 * truth.abs(), "{cause}: {size:?}");
             assert!(least_half_width > 0.0 && least_half_width < 1.01 * half_width, "{cause}: {size:?}");
         }

@@ -60,17 +60,21 @@ impl Row {
     /// Error, half width, least half width, relative to the true size and in percent, and how often the interval contains it.
     fn size_cells(&self) -> Vec<String> {
         let sizes = self.sizes();
-        let percent = |of: fn(&Size) -> f64| {
-            let parts: Vec<f64> = sizes.iter().map(|size| 100.0 * (of(size) / size.truth).abs()).collect();
+        let percent = |of: fn(&Outcome, Size) -> Option<f64>| {
+            let part = |outcome: &Outcome| {
+                let size = outcome.size?;
+                Some(100.0 * (of(outcome, size)? / size.truth).abs())
+            };
+            let parts: Vec<f64> = self.outcomes.iter().filter_map(part).collect();
             median(&parts).map_or_else(|| "-".to_owned(), |middle| format!("{middle:.2}"))
         };
         vec![
             self.fault.name().to_owned(),
             format!("{}", self.size),
             sizes.len().to_string(),
-            percent(|size| size.error),
-            percent(|size| size.half_width),
-            percent(|size| size.least_half_width),
+            percent(|_, size| Some(size.error)),
+            percent(|_, size| Some(size.half_width)),
+            percent(|outcome, _| outcome.least_half_width),
             covered(&sizes),
         ]
     }
