@@ -140,7 +140,8 @@ const fn of(cause: Cause, vectors: &'static [usize], lowest: f64, highest: f64) 
     Hypothesis { cause, vectors, lowest, highest }
 }
 
-/// The hypotheses. The first vector is the nuisance [`INITIAL`], except of pinned readings.
+/// The hypotheses. The first vector is the nuisance [`INITIAL`], except of pinned readings. A drift has changed the gain by the time of the
+/// restart: it has [`GAIN`] as a further nuisance.
 pub const HYPOTHESES: [Hypothesis; 26] = [
     of(Cause::GainError, &[INITIAL, GAIN], -0.7, 4.0),
     of(Cause::InstantaneousShare, &[INITIAL, SHARE], -0.1, 0.8),
@@ -165,15 +166,16 @@ pub const HYPOTHESES: [Hypothesis; 26] = [
     of(Cause::SeriesLag, &[INITIAL, LAG_MIDDLE, LAG], 0.0, 200.0),
     of(Cause::SeriesLag, &[INITIAL, LAG_LONGER, LAG_SECOND], 0.0, 200.0),
     of(Cause::ReadingOffset, &[INITIAL, OFFSET], -1000.0, 1000.0),
-    of(Cause::Drift, &[INITIAL, DRIFT], -1000.0, 1000.0),
+    of(Cause::Drift, &[INITIAL, GAIN, DRIFT], -1000.0, 1000.0),
     of(Cause::SensorSaturation, &[PINNED_BELOW], 0.9, 1.1),
     of(Cause::StuckSensor, &[PINNED], 0.9, 1.1),
 ];
 
 /// Pairs of causes of which the second contains the first: it always leaves less, and is named only if the first is excluded, and not by
 /// the bounds of its size alone.
-pub const NESTED: [(Cause, Cause); 3] = [
+pub const NESTED: [(Cause, Cause); 4] = [
     (Cause::GainError, Cause::StaticNonlinearity),
+    (Cause::GainError, Cause::Drift),
     (Cause::TimeConstant, Cause::VoltageDependentTimeConstant),
     (Cause::SensorSaturation, Cause::StuckSensor),
 ];

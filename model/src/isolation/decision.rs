@@ -535,9 +535,10 @@ mod tests {
         use Cause::{SensorSaturation, StaticNonlinearity, StuckSensor};
         // Noise, margin and 2^-10 of the total.
         let bar = (50 + 20 + 1) * ONE;
-        let law = |gain| verdict_of(1024 * ONE, 0, &[(StaticNonlinearity, 0)], [gain, i64::MAX, i64::MAX], false);
+        let unbounded = |gain| NESTED.map(|(inner, _)| if inner == Cause::GainError { gain } else { i64::MAX });
+        let law = |gain| verdict_of(1024 * ONE, 0, &[(StaticNonlinearity, 0)], unbounded(gain), false);
         assert_eq!([bar - 1, bar].map(law), [Verdict::Unknown, Verdict::Named(StaticNonlinearity)]);
-        let pinned = |left: &[(Cause, i64)], released| verdict_of(1024 * ONE, 0, left, [i64::MAX; 3], released);
+        let pinned = |left: &[(Cause, i64)], released| verdict_of(1024 * ONE, 0, left, unbounded(i64::MAX), released);
         let both = [(SensorSaturation, 0), (StuckSensor, 0)];
         assert_eq!(pinned(&both, true), Verdict::Named(SensorSaturation));
         assert_eq!(pinned(&both, false), Verdict::Ambiguous(SensorSaturation, StuckSensor));
