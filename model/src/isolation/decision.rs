@@ -98,6 +98,8 @@ pub(super) struct Decision {
     pub(super) rounds: u32,
     /// Leftover without a cause and with the best one at the last decision, in variances with 20 fraction bits.
     pub(super) energies: (i64, i64),
+    /// Number of blocks of the last decision.
+    pub(super) decided: u32,
 }
 
 /// A pivot to divide by.
@@ -195,6 +197,7 @@ impl Decision {
         size: Size::NEW,
         rounds: 0,
         energies: (0, 0),
+        decided: 0,
     };
 
     /// True if no decision is being made.
@@ -454,7 +457,7 @@ impl Decision {
         if let Some(cause) = self.verdict.causes().0 {
             self.size = self.sizes.get(cause as usize).copied().unwrap_or_default();
         }
-        self.energies = (self.none, left);
+        (self.energies, self.decided) = ((self.none, left), self.blocks);
         self.rounds = self.rounds.wrapping_add(1);
         self.stage = Stage::Idle;
     }

@@ -514,8 +514,8 @@ impl State {
 
     /// Returns what the bank says, in the numbers of the tick.
     pub fn report(&self) -> Report {
-        let decision::Decision { size, energies, .. } = self.decision;
-        Report { verdict: self.verdict(), since_blocks: self.since_blocks(), size, energies }
+        let decision::Decision { size, energies, decided, .. } = self.decision;
+        Report { verdict: self.verdict(), since_blocks: self.since_blocks(), size, energies, blocks: decided }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the bank says: in the numbers of the tick, and in SI units.
 
+use super::bank::{HYPOTHESES, SIGNATURE_ERRORS};
 use super::decision::Size;
 use super::{Cause, Settings, Verdict};
 
@@ -15,6 +16,8 @@ pub struct Report {
     /// Energy of the innovations without a cause at the last decision, and what the best cause leaves of it, in variances with 20
     /// fraction bits.
     pub(super) energies: (i64, i64),
+    /// Number of blocks of the last decision.
+    pub(super) blocks: u32,
 }
 
 /// The cause that explains most, in SI units.
@@ -26,7 +29,9 @@ pub struct Finding {
     pub other: Option<Cause>,
     /// Size of the cause, in the unit of [`Cause::unit`].
     pub size: f64,
-    /// Half of the width of the 95 % interval of the size. It holds the noise only, not the error of the linear signature.
+    /// Half of the width of the 95 % interval of the size, in the same unit: that of the noise and of the signature's error
+    /// ([`bank::SIGNATURE_ERRORS`](super::bank::SIGNATURE_ERRORS)). If the readings do not determine the size, the interval holds every
+    /// possible one.
     pub half_width: f64,
     /// Part of the residual's energy, its noise included, that the cause explains, 0 to 1.
     pub explained: f64,
@@ -62,11 +67,28 @@ impl Report {
     pub fn finding(&self, settings: &Settings, rate_hz: f64) -> Option<Finding> {
         let (cause, other) = self.verdict.causes();
         let cause = cause?;
-        let (size, deviation) = self.size();
-        let (none, left) = self.energies();
         let factor = settings.unit(cause, rate_hz);
+        let (size, half_width) = self.interval(cause);
+        let (none, left) = self.energies();
         let explained = 1.0 - left / none.max(left);
-        Some(Finding { cause, other, size: factor * size, half_width: 1.96 * factor * deviation, explained })
+        Some(Finding { cause, other, size: factor * size, half_width: factor * half_width, explained })
+    }
+
+    /// Returns the size in units of [`Settings::unit`] and half of the width of its 95 % interval.
+    fn interval(&self, cause: Cause) -> (f64, f64) {
+        let hypothesis = HYPOTHESES.iter().find(|hypothesis| hypothesis.cause == cause);
+        let (size, deviation) = self.size();
+        if deviation <= 0.0 {
+            return hypothesis.map_or((0.0, 0.0), |possible| {
+                (0.5 * (possible.lowest + possible.highest), 0.5 * (possible.highest - possible.lowest))
+            });
+        }
+        let (none, left) = self.energies();
+        let (of_excess, of_explained) = SIGNATURE_ERRORS.get(cause as usize).copied().unwrap_or_default();
+        let excess = (left - f64::from(self.blocks)).max(0.0);
+        let explained = (none - left).max(0.0);
+        let variances = 1.96 * 1.96 + of_excess * of_excess * excess + of_explained * of_explained * explained;
+        (size, deviation * libm::sqrt(variances))
     }
 }
 
@@ -77,6 +99,6 @@ impl Report {
     pub(crate) fn of(verdict: Verdict, since_blocks: u32, size: f64, energy: u32) -> Self {
         let size = Size { numerator: (size * f64::from(1 << 20)) as i32, denominator: 1 << 20, exponent: 0, scale: 10 };
         let none = i64::from(since_blocks) * (1 + i64::from(energy));
-        Self { verdict, since_blocks, size, energies: (none << 20, 0) }
+        Self { verdict, since_blocks, size, energies: (none << 20, 0), blocks: since_blocks }
     }
 }

@@ -189,20 +189,35 @@ fn a_size_is_in_the_unit_of_its_cause() {
     }
 }
 
-/// A finding holds the size in the unit of its cause, the 95 % interval that the noise leaves it, and the part of the residual's energy
-/// that the cause explains: none if it leaves more than there was.
+/// A finding holds the size in the unit of its cause, the 95 % interval that the noise and the error of the signature leave it, and the
+/// part of the residual's energy that the cause explains: none if it leaves more than there was.
 #[test]
 fn a_finding_holds_size_interval_and_explained_part() {
     // 3/8 of 2^1; the information is 2^24 times 2^16 over 2^20.
     let size = decision::Size { numerator: 3 << 21, denominator: 1 << 24, exponent: 1, scale: 8 };
     let energies = (8 << 20, 2 << 20);
-    let report = Report { verdict: Verdict::Named(Cause::Hysteresis), since_blocks: 5, size, energies };
+    let report = Report { verdict: Verdict::Named(Cause::Delay), since_blocks: 5, size, energies, blocks: 1 };
     assert_eq!((report.energies(), report.size()), ((8.0, 2.0), (0.75, 1.0 / 1024.0)));
-    let Finding { cause, other, size, half_width, explained } = report.finding(&Settings::PAPER, 1000.0).unwrap();
-    assert_eq!((cause, other, size, explained), (Cause::Hysteresis, None, 0.75 * 700.0, 0.75));
-    assert!((half_width - 1.96 * 700.0 / 1024.0).abs() < 1e-9, "{half_width}");
-    let worse = Report { energies: (8 << 20, 9 << 20), ..report };
-    assert_eq!(worse.finding(&Settings::PAPER, 1000.0).unwrap().explained, 0.0);
+    let finding = |report: Report| report.finding(&Settings::PAPER, 1000.0).unwrap();
+    let Finding { cause, other, size, half_width, explained } = finding(report);
+    assert_eq!((cause, other, size, explained), (Cause::Delay, None, 0.75 * 0.128, 0.75));
+    // An energy of one variance above the noise, and six that are explained.
+    let (of_excess, of_explained) = bank::SIGNATURE_ERRORS[Cause::Delay as usize];
+    let noise = 1.96 * 1.96;
+    let deviations = (noise + of_excess * of_excess + 6.0 * of_explained * of_explained).sqrt();
+    assert!((half_width - deviations * 0.128 / 1024.0).abs() < 1e-9, "{half_width}");
+    let linear = finding(Report { verdict: Verdict::Named(Cause::GainError), ..report });
+    assert!((linear.half_width - 1.96 / 1024.0).abs() < 1e-12, "{linear:?}");
+    assert_eq!(finding(Report { energies: (8 << 20, 9 << 20), ..report }).explained, 0.0);
+}
+
+/// A size on which the readings do not depend is no size of 0 that is known exactly: its interval is that of what is possible.
+#[test]
+fn a_size_that_is_not_determined_can_be_any() {
+    let verdict = Verdict::Named(Cause::ChargeLeakage);
+    let report = Report { verdict, since_blocks: 5, energies: (8 << 20, 2 << 20), blocks: 1, ..Report::default() };
+    let Finding { size, half_width, .. } = report.finding(&Settings::PAPER, 1000.0).unwrap();
+    assert_eq!((size, half_width), (0.45, 0.45));
 }
 
 #[test]
@@ -257,7 +272,7 @@ fn every_tick_is_the_same_to_the_bit() {
             if tick == 349_993 {
                 state.acknowledge();
             }
-            let Report { verdict, since_blocks, size, energies } = state.report();
+            let Report { verdict, since_blocks, size, energies, .. } = state.report();
             let values = [
                 i64::from(verdict.code()),
                 i64::from(since_blocks),

@@ -73,7 +73,7 @@ impl Event {
     }
 }
 
-/// A size with its 95 % interval. The interval holds the noise only, not the error of the linear signature.
+/// A size with its 95 % interval, that of [`Finding::half_width`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Size {
     /// The size.

@@ -115,7 +115,7 @@ fn watched(faulty: &Spring) -> (Verdict, f64, u64) {
         }
         if state.decisions() != decisions {
             decisions = state.decisions();
-            let Report { verdict, since_blocks, size, energies } = state.report();
+            let Report { verdict, since_blocks, size, energies, .. } = state.report();
             let values = [
                 i64::from(verdict.code()),
                 i64::from(since_blocks),
