@@ -1,7 +1,8 @@
 //! The bounds of the sensor, at which readings accumulate.
 //!
 //! Continuous noise does not give the same number twice. Readings that are exactly the highest or the lowest more often than noise,
-//! rounding or a spring at rest repeat any other one therefore stopped there.
+//! rounding or a spring at rest repeat any other one therefore stopped there. Beyond a bound only single readings may be that what comes
+//! behind the sensor spoils, if far more often the readings stop at the bound, and do so again and again.
 
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::stats::median::robust_deviation;
@@ -10,6 +11,10 @@ use crate::stats::thresholds::empirical::{BOUND_TO_NEXT_STEP, CLOSE_TO_BOUND, CO
 
 /// Fewest distinct readings from which a grid can be found.
 const FEWEST_ON_GRID: usize = 6;
+
+/// Most readings beyond a bound, relative to those at it, and the part of them that may be beside another one.
+const BEYOND: f64 = 0.1;
+const TOGETHER: f64 = 0.1;
 
 /// The bounds at which readings stopped, in the unit of the readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,17 +74,21 @@ impl Bounds {
             |count: usize| inner.clone().filter(|(value, times)| *value != 0.0 && *times >= count).count() <= 1;
         let far = CLOSE_TO_BOUND.get() * scatter;
         let is_fine = step.is_some_and(|step| step < COARSE.get() * scatter);
-        let bound = |extreme: Option<&(f64, usize)>, next: Option<&(f64, usize)>| {
-            let (value, count) = *extreme?;
+        // From the extreme inwards.
+        let bound = |values: &mut dyn Iterator<Item = &(f64, usize)>, is_beyond: fn(&f64, &f64) -> bool| {
+            let mut values = values.skip_while(|(_, count)| *count < FEWEST_TIES.count());
+            let ((value, count), next) = (*values.next()?, values.next());
             // On a fine grid the next step is a fair judge. On a coarse one every level at which the spring settles repeats one reading,
             // and without one any reading may often be the same.
             let compared = if is_fine { next.map_or(1, |next| next.1) } else { most_repeated };
             let piled = count >= FEWEST_TIES.count()
                 && (continuous && stands_out(count) || count >= BOUND_TO_NEXT_STEP.count() * compared);
             // A spring at rest reads exactly zero many times.
-            (piled && count < readings.len() && value != 0.0 && stays(readings, value, far)).then_some(value)
+            let is_bound = piled && count < readings.len() && value != 0.0 && stays(readings, value, far);
+            let beyond: Vec<usize> = (0..readings.len()).filter(|&row| is_beyond(&readings[row], &value)).collect();
+            (is_bound && (beyond.is_empty() || are_single(&beyond, readings, value, count))).then_some(value)
         };
-        Self { upper: bound(counts.last(), counts.iter().rev().nth(1)), lower: bound(counts.first(), counts.get(1)) }
+        Self { upper: bound(&mut counts.iter().rev(), f64::gt), lower: bound(&mut counts.iter(), f64::lt) }
     }
 
     /// Returns true if a reading stopped at a bound.
@@ -99,6 +108,15 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
     let rows = || (0..reading.len()).filter(|&row| reading[row] == value);
     let staying = rows().filter(|&row| near(reading.get(row + 1)) || near(reading.get(row.wrapping_sub(1)))).count();
     2 * staying >= rows().count()
+}
+
+/// Returns true if the rows `beyond` a value are few and single ones, between `count` readings with the value, to which they return.
+fn are_single(beyond: &[usize], readings: &[f64], value: f64, count: usize) -> bool {
+    let together = beyond.windows(2).filter(|pair| pair[1] == pair[0] + 1).count();
+    let begins = readings.windows(2).filter(|pair| pair[1] == value && pair[0] != value).count();
+    begins >= FEWEST_TIES.count()
+        && beyond.len() as f64 <= BEYOND * count as f64
+        && together as f64 <= TOGETHER * beyond.len() as f64
 }
 
 #[cfg(test)]
@@ -146,6 +164,29 @@ mod tests {
         let counted =
             |read: Vec<f64>| read.into_iter().map(|y| 30_199.0 / (30_199.0 / (y + 200.0)).round() - 200.0).collect();
         assert_eq!(upper(0, counted), None);
+    }
+
+    /// Outliers that come behind the sensor, in the link.
+    #[test]
+    fn single_readings_may_be_beyond_a_bound() {
+        let spoilt = |every: usize, length: usize| {
+            move |read: Vec<f64>| {
+                let stopped = read.into_iter().map(|reading| reading.min(350.0));
+                let is_spoilt = move |row: usize| row % every < length;
+                stopped
+                    .enumerate()
+                    .map(|(row, y)| if is_spoilt(row) { y + 10.0 + row as f64 / 100.0 } else { y })
+                    .collect()
+            }
+        };
+        for seed in 0..20 {
+            assert_eq!(bounds(seed, spoilt(37, 1)), Bounds { upper: Some(350.0), lower: None }, "{seed}");
+            // In succession they are a response.
+            assert_eq!(upper(seed, spoilt(200, 8)), None, "{seed}");
+        }
+        // A sensor that was stuck once, below its highest readings.
+        let stuck = |read: Vec<f64>| (0..read.len()).map(|row| read[if (500..540).contains(&row) { 500 } else { row }]);
+        assert_eq!(upper(0, |read| stuck(read).collect()), None);
     }
 
     /// Rounded to much more than the noise, every level of a stair is one reading: the extremes as well, and no step next to them.

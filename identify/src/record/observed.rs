@@ -90,10 +90,10 @@ impl Observed {
         let coarse = grid.map(|grid| grid.step).filter(|step| *step >= COARSE.get() * scatter_v);
         let cells = coarse.and_then(|step| missing_codes::cells(&data.reading, &data.voltage_v, step));
         let kind = |(row, &reading): (usize, &f64)| {
-            if upper.is_some_and(|bound| reading >= bound) {
+            if upper == Some(reading) {
                 return Kind::AtLeast;
             }
-            if lower.is_some_and(|bound| reading <= bound) {
+            if lower == Some(reading) {
                 return Kind::AtMost;
             }
             let change = unreported(row);

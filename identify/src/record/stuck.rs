@@ -16,6 +16,7 @@ use std::ops::Range;
 
 use simulation::record::Record;
 
+use crate::record::bounds::Bounds;
 use crate::stats::median::median;
 use crate::stats::thresholds::empirical::{FEWEST_TIES, LEAST_HELD, SHORTEST_RUN};
 
@@ -79,7 +80,10 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let runs = runs(value.len(), |row| (value[row] - value[row - 1]).abs() <= rounding);
     let readings = Readings::of(value, voltage, rounding, &runs)?;
     // The first readings may be those of a spring at rest in a simulation.
-    let special = [low, high, 0.0].map(|value| (value, readings.begins(value)));
+    let Bounds { upper, lower } = Bounds::of_file(&readings.value);
+    let special = [Some(low), Some(high), Some(0.0), upper, lower];
+    let special: Vec<(f64, usize)> =
+        special.into_iter().flatten().map(|value| (value, readings.begins(value))).collect();
     let is_special = |run: &Range<usize>| special.iter().any(|(value, _)| readings.equal(run.start, *value));
     // With noise, a bound is reached again and again.
     let is_bound = |run: &Range<usize>| {

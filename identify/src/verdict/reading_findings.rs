@@ -70,6 +70,8 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
     for (bound, upper) in [(observed.upper, true), (observed.lower, false)] {
         let Some(bound) = bound else { continue };
         let stopped = data.reading.iter().filter(|&&reading| reading == bound).count();
+        let beyond =
+            data.reading.iter().filter(|&&reading| if upper { reading > bound } else { reading < bound }).count();
         findings.push(Finding {
             cause: "sensor-saturation",
             probability: 1.0,
@@ -83,9 +85,10 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
             rmse_before: raw,
             rmse_after: stopped_raw,
             evidence: format!(
-                "{stopped} readings are exactly {}, the {} of all",
+                "{stopped} readings are exactly {}, the {} of all{}",
                 scales.restored(Dimension::Reading, bound),
-                if upper == (scales.reading > 0.0) { "highest" } else { "lowest" }
+                if upper == (scales.reading > 0.0) { "highest" } else { "lowest" },
+                if beyond > 0 { format!(" but {beyond} single ones") } else { String::new() }
             ),
             proved: true,
         });
