@@ -199,6 +199,12 @@ pub trait Effect: Sync {
         None
     }
 
+    /// Returns the cause that is a special case of the effect, and the point of that cause's first form nearest to a point; `None` if there
+    /// is none.
+    fn special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+        None
+    }
+
     /// Returns the logarithm of the number of independent candidates that a search for a form compares; the likelihood
     /// gain is reduced by this, in nats.
     fn ln_candidates(&self, _form: usize, _data: &Data) -> f64 {

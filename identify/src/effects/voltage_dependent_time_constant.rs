@@ -51,6 +51,11 @@ impl Effect for VoltageDependentTimeConstant {
         FORMS.len() + 1
     }
 
+    /// The same time constant at all voltages.
+    fn special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+        Some(("time-constant", vec![0.5 * (point[0] + point[1])]))
+    }
+
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         let coordinate = Coordinate::log(0.2 * data.sample_s, 10.0 * data.duration_s());
         let mut coordinates = vec![coordinate, coordinate];

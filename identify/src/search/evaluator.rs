@@ -100,8 +100,8 @@ pub trait Evaluator {
         self.doubts(fit)
     }
 
-    /// Models in which one of the blocks includes the gain error of a model; none if it has no gain error.
-    fn merged(&self, _model: &Model) -> Vec<Model> {
+    /// Models with a simpler block in place of one or two of a model: a special case of it, or one that includes the gain error.
+    fn simpler(&self, _model: &Model) -> Vec<Model> {
         Vec::new()
     }
 
@@ -216,15 +216,23 @@ impl Evaluator for Engine<'_> {
         self.doubts(fit) || adequacy::first_significant(self, fit).is_some()
     }
 
-    fn merged(&self, model: &Model) -> Vec<Model> {
-        let Some(gain_error) = index_of("gain-error") else { return Vec::new() };
-        let Some(&[gain]) = model.point(gain_error) else { return Vec::new() };
-        let rest = model.without(gain_error);
-        let merged = |(block, point): &(Block, Vec<f64>)| {
-            let (form, point) = block.effect().with_gain(block.form, point, gain, self.data)?;
-            Some(rest.without(block.effect).with(Block { form, ..*block }, point))
+    fn simpler(&self, model: &Model) -> Vec<Model> {
+        let special_case = |(block, point): &(Block, Vec<f64>)| {
+            let (cause, point) = block.effect().special_case(block.form, point)?;
+            let effect = index_of(cause).filter(|_| self.allows(cause))?;
+            Some(model.without(block.effect).with(Block { effect, form: 0 }, point))
         };
-        rest.blocks.iter().filter_map(merged).collect()
+        let special_cases = model.blocks.iter().filter_map(special_case);
+        let with_gain = |gain_error: usize, gain: f64| {
+            let rest = model.without(gain_error);
+            let merged = |(block, point): &(Block, Vec<f64>)| {
+                let (form, point) = block.effect().with_gain(block.form, point, gain, self.data)?;
+                Some(rest.without(block.effect).with(Block { form, ..*block }, point))
+            };
+            rest.blocks.iter().filter_map(merged).collect::<Vec<_>>()
+        };
+        let gain = index_of("gain-error").and_then(|effect| Some((effect, *model.point(effect)?.first()?)));
+        special_cases.chain(gain.into_iter().flat_map(|(effect, gain)| with_gain(effect, gain))).collect()
     }
 
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {

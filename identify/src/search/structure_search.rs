@@ -352,14 +352,14 @@ impl<'e, E: Evaluator> Search<'e, E> {
         scored
     }
 
-    /// Removes blocks, or merges two, while that raises the score.
+    /// Removes blocks, or replaces them by simpler ones, while that raises the score.
     fn pruned(&mut self, mut scored: Scored) -> Scored {
         loop {
             if self.evaluator.is_over() {
                 return scored;
             }
             let without = effects(&scored.fit.model).into_iter().map(|effect| scored.fit.model.without(effect));
-            let models: Vec<Model> = without.chain(self.evaluator.merged(&scored.fit.model)).collect();
+            let models: Vec<Model> = without.chain(self.evaluator.simpler(&scored.fit.model)).collect();
             let shorter = models.into_iter().map(|model| self.evaluated.evaluate_from(self.evaluator, model));
             match shorter.max_by(|a, b| a.score.total_cmp(&b.score)) {
                 Some(shorter) if shorter.score > scored.score => scored = shorter,
