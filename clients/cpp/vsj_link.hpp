@@ -755,7 +755,7 @@ public:
         check_rate(rate_hz);
         const double end_s = check_schedule(schedule);
         if (schedule.empty() && !seconds) throw Error("record: neither seconds nor a schedule; expected one of them");
-        if (seconds && !(*seconds > 0)) throw Error("seconds " + text(*seconds) + ": expected a positive number of seconds");
+        if (seconds && !(std::isfinite(*seconds) && *seconds > 0)) throw Error("seconds " + text(*seconds) + ": expected a positive number of seconds");
         const Status before = status();
         for (const Step& step : schedule)
             if (!(step.target_v >= before.lowest_v && step.target_v <= before.highest_v))
@@ -909,6 +909,7 @@ private:
             // The answer was lost, so that the request came again, to a microcontroller that has restarted.
         }
         every_ticks_ = 0;
+        samples_.clear();
         begin();
         unheard_.clear();
     }

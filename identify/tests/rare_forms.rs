@@ -16,7 +16,8 @@ const STEPS: usize = 100;
 const FULL_SCALE_V: f64 = 500.0;
 const FREQ_HZ: f64 = 0.73;
 
-/// Diagnoses the paper's spring under steps of 6 s between 0 and 500 V, as [`diagnosed_from`].
+/// Diagnoses the paper's spring under steps of 6 s between 0 and 500 V, with noise of 1 V; the arguments are those of
+/// [`diagnosed_from`].
 fn diagnosed(
     amplified_v: impl Fn(f64, f64) -> f64,
     tau_s: impl Fn(usize) -> f64,
@@ -25,9 +26,9 @@ fn diagnosed(
     diagnosed_from(0.0, amplified_v, tau_s, read)
 }
 
-/// Diagnoses the paper's spring under steps of 6 s between `lowest_v` and 500 V, with noise of 1 V. `amplified_v` returns the voltage across it from the commanded one
-/// and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `read` the reading in a row from response and noise; all others in
-/// V.
+/// Diagnoses the paper's spring under steps of 6 s between `lowest_v` and 500 V, with noise of 1 V. `amplified_v` returns the voltage
+/// across it from the commanded one and the one 1 ms ago, `tau_s` the time constant in a row, in s, and `read` the reading in a row from
+/// response and noise; all others in V.
 fn diagnosed_from(
     lowest_v: f64,
     amplified_v: impl Fn(f64, f64) -> f64,
@@ -220,6 +221,21 @@ fn a_limit_of_the_amplifier_for_one_sign_is_found() {
         let found_v = of_only_finding(&report, "amplifier-limit", name).value;
         assert!((found_v - limit_v).abs() < 2.0, "{report:#?}");
     }
+}
+
+/// The link after a sensor that stops at 230 V spoils single readings.
+#[test]
+fn a_bound_of_the_sensor_below_outliers_is_no_stuck_sensor() {
+    let read = |row: usize, response: f64, noise: f64| {
+        let reading = f64::min(response + noise, 230.0);
+        if row % 67 == 33 { reading + 60.0 + row as f64 / 100.0 } else { reading }
+    };
+    let report = diagnosed(ideal, |_| TAU_S, read);
+    let mut causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    assert_eq!(causes, ["outliers", "sensor-saturation"], "{report:#?}");
+    let bound = report.findings.iter().find(|finding| finding.cause == "sensor-saturation").unwrap();
+    assert!(bound.proved && bound.evidence.contains("the highest of all but for single ones"), "{}", bound.evidence);
 }
 
 /// A sensor whose reading saturates gradually on both sides, and one that becomes more sensitive.

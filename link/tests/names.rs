@@ -39,6 +39,15 @@ fn a_field_has_the_same_name_in_the_header_for_cpp() {
     assert_eq!(listed, names);
 }
 
+/// So it has the format of a model, its longest payload and the bytes in a part.
+#[test]
+fn the_header_for_cpp_sends_models_in_the_same_parts() {
+    use link::wire_model::{FORMAT, MOST_BYTES};
+    let header = include_str!("../../clients/cpp/vsj_link.hpp");
+    let parts = format!("most_model_bytes = {MOST_BYTES}, part_bytes = {};", link::block::PART);
+    assert!(header.contains(&parts) && header.contains(&format!("model_format = {FORMAT};")), "{parts}");
+}
+
 /// A field without a code would be refused as `another setting`.
 #[test]
 fn every_field_of_the_settings_that_a_check_can_name_has_a_code() {

@@ -453,7 +453,7 @@ def test_an_exception_of_an_object_stores_package_is_one_line_with_the_address(t
 
 
 class StoreError(Exception):
-    """As of an object store's package: no ``OSError``, and not to be read by another process, as it needs two arguments."""
+    """An exception like that of an object store's package: no ``OSError``, and not to be read by another process, as it needs two arguments."""
 
     def __init__(self, code, words):
         super().__init__(f"{code}: {words}\nand more")

@@ -322,7 +322,7 @@ class Link:
 
 def _length_s(seconds: Any) -> float:
     length_s = number("seconds", seconds)
-    if not length_s > 0:
+    if not (math.isfinite(length_s) and length_s > 0):
         raise _vsj.BadInput(f"seconds {length_s:g}: expected a positive number of seconds")
     return length_s
 

@@ -8,7 +8,7 @@
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, table};
-use crate::plant::chain::{Chain, Limited};
+use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
 pub(super) struct AmplifierLimit;
@@ -76,14 +76,40 @@ impl Effect for AmplifierLimit {
     }
 
     fn modify_chain<'a>(&self, form: usize, point: &'a [f64], _: &'a Data, chain: &mut Chain<'a>) {
+        let limits_v = match form {
+            POSITIVE => &mut chain.limits_v[..1],
+            NEGATIVE => &mut chain.limits_v[1..],
+            _ => &mut chain.limits_v,
+        };
         // The lower limit counts; an equal one is that of a plant file, which holds no knee.
-        if point[0] <= chain.limit_v {
-            (chain.limit_v, chain.knee_v) = (point[0], if form == WITH_KNEE { point[1].exp() } else { 0.0 });
-            chain.limited = match form {
-                POSITIVE => Limited::Positive,
-                NEGATIVE => Limited::Negative,
-                _ => Limited::Both,
-            };
+        for limit_v in limits_v.iter_mut().filter(|limit_v| point[0] <= **limit_v) {
+            *limit_v = point[0];
+            chain.knee_v = if form == WITH_KNEE { point[1].exp() } else { 0.0 };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::index_of;
+    use crate::effects::model::{Block, Model};
+    use crate::plant::base::Base;
+    use crate::record::input::Input;
+    use simulation::plant_file::{Amplifier, PlantFile};
+    use simulation::record::{Record, Row};
+
+    #[test]
+    fn a_limit_of_one_sign_leaves_the_nominal_one_of_the_other() {
+        let amplifier = Amplifier { limit_v: Some(400.0), ..Amplifier::default() };
+        let base = Base::new(PlantFile { amplifier: Some(amplifier), ..model::Plant::PAPER.into() }).unwrap();
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 500.0, measured: Some(0.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold);
+        let limits_v = |form, limit_v| {
+            let block = Block { effect: index_of("amplifier-limit").unwrap(), form };
+            Model::default().with(block, vec![limit_v]).chain(&base, &data).limits_v
+        };
+        assert_eq!([limits_v(POSITIVE, 300.0), limits_v(NEGATIVE, 300.0)], [[300.0, 400.0], [400.0, 300.0]]);
+        assert_eq!([limits_v(0, 300.0), limits_v(POSITIVE, 450.0)], [[300.0; 2], [400.0; 2]]);
     }
 }

@@ -199,9 +199,9 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Returns the cause that is a special case of the effect, and the point of that cause's first form nearest to a point; `None` if there
-    /// is none.
-    fn special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+    /// Returns the cause that is a special case of the effect, and the point of that cause's first form nearest to a point; `None` if it
+    /// has no special case.
+    fn nearest_special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
         None
     }
 

@@ -25,7 +25,7 @@ fn times_s(data: &Data) -> (f64, f64) {
     (shortest, (LONGEST * REFERENCE_TIME_CONSTANT_S).max(2.0 * shortest))
 }
 
-/// Distances of initial points from the nominal share, on both sides of it: predicted gains do not see what lies behind.
+/// Distances of initial points from the nominal share, on both sides of it: a predicted gain counts changes towards the point only.
 const INITIAL_CHANGES: [f64; 4] = [-0.2, -0.04, 0.04, 0.2];
 
 impl Effect for InstantaneousShare {

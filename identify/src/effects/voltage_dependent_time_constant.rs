@@ -51,8 +51,8 @@ impl Effect for VoltageDependentTimeConstant {
         FORMS.len() + 1
     }
 
-    /// The same time constant at all voltages.
-    fn special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+    /// Returns the constant time constant nearest to a point: the geometric mean of both ends. It does not see a nominal ratio of them.
+    fn nearest_special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
         Some(("time-constant", vec![0.5 * (point[0] + point[1])]))
     }
 

@@ -26,36 +26,11 @@ use crate::record::scales::REFERENCE_VOLTAGE_V;
 use crate::record::signal::{Lag, Piece, Signal};
 use simulation::plant_file::{Amplifier, Leakage, PlantFile};
 
-/// Which voltages of the amplifier have a limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Limited {
-    /// Those of both signs, at the same magnitude.
-    #[default]
-    Both,
-    /// The positive ones.
-    Positive,
-    /// The negative ones.
-    Negative,
-}
-
-impl Limited {
-    /// Returns true if a voltage, in V, has a limit.
-    fn includes(self, voltage_v: f64) -> bool {
-        match self {
-            Self::Both => true,
-            Self::Positive => voltage_v > 0.0,
-            Self::Negative => voltage_v < 0.0,
-        }
-    }
-}
-
 /// All blocks between the command and the stiffness that effects can modify.
 pub struct Chain<'a> {
-    /// Largest magnitude of the amplifier's voltage, in V.
-    pub limit_v: f64,
-    /// Sign of the voltages that it limits. A plant file cannot hold one sign alone.
-    pub limited: Limited,
-    /// Knee with which it is approached, in V; 0 for none. A plant file cannot hold it.
+    /// Largest magnitudes of the amplifier's positive and negative voltages, in V. A plant file holds one for both.
+    pub limits_v: [f64; 2],
+    /// Knee with which they are approached, in V; 0 for none. A plant file cannot hold it.
     pub knee_v: f64,
     /// Largest rate at which the amplifier's voltage rises, in V/s.
     pub rising_v_per_s: f64,
@@ -111,8 +86,7 @@ impl<'a> Chain<'a> {
         let number = |of: fn(&Amplifier) -> Option<f64>, else_value| amplifier.and_then(of).unwrap_or(else_value);
         let slew_v_per_s = number(|amplifier| amplifier.slew_v_per_s, f64::INFINITY);
         Self {
-            limit_v: number(|amplifier| amplifier.limit_v, f64::INFINITY),
-            limited: Limited::Both,
+            limits_v: [number(|amplifier| amplifier.limit_v, f64::INFINITY); 2],
             knee_v: 0.0,
             rising_v_per_s: slew_v_per_s,
             falling_v_per_s: slew_v_per_s,
@@ -138,7 +112,8 @@ impl<'a> Chain<'a> {
     /// Writes the chain to a plant file, with laws tabulated where a record has been.
     pub fn write(&self, file: &mut PlantFile, visited: &Visited) {
         let amplifier = Amplifier {
-            limit_v: Some(self.limit_v).filter(|limit| limit.is_finite()),
+            // One limit for both signs: the farther one, which takes no voltage away.
+            limit_v: Some(self.limits_v[0].max(self.limits_v[1])).filter(|limit| limit.is_finite()),
             // A file holds one rate; the faster one bounds both directions.
             slew_v_per_s: Some(self.rising_v_per_s.max(self.falling_v_per_s)).filter(|slew| slew.is_finite()),
             delay_s: Some(self.delay_s).filter(|delay| *delay > 0.0),
@@ -219,12 +194,13 @@ impl<'a> Chain<'a> {
 
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
     pub fn amplify(&self, signal: &mut Signal) {
-        if self.limit_v.is_finite() {
-            // Zero at 0 V, which a large knee reaches.
-            let below = |voltage: f64| at_most(voltage, self.limit_v, self.knee_v);
-            let at_rest = below(0.0);
-            let limited = |voltage: f64| (below(voltage.abs()) - at_rest).copysign(voltage);
-            signal.map(|voltage| if self.limited.includes(voltage) { limited(voltage) } else { voltage });
+        if self.limits_v.iter().any(|limit| limit.is_finite()) {
+            signal.map(|voltage| {
+                let limit_v = self.limits_v[usize::from(voltage < 0.0)];
+                // Zero at 0 V, which a large knee reaches.
+                let below = |voltage: f64| at_most(voltage, limit_v, self.knee_v);
+                if limit_v.is_finite() { (below(voltage.abs()) - below(0.0)).copysign(voltage) } else { voltage }
+            });
         }
         signal.before = self.initial_v.unwrap_or(signal.before);
         if self.follow_tau_s > 0.0 {

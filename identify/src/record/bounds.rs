@@ -1,8 +1,8 @@
 //! The bounds of the sensor, at which readings accumulate.
 //!
 //! Continuous noise does not give the same number twice. Readings that are exactly the highest or the lowest more often than noise,
-//! rounding or a spring at rest repeat any other one therefore stopped there. Beyond a bound only single readings may be that what comes
-//! behind the sensor spoils, if far more often the readings stop at the bound, and do so again and again.
+//! rounding or a spring at rest repeat any other one therefore stopped there. A few single readings may lie beyond a bound, those that the
+//! link after the sensor spoils, if the readings stop at the bound far more often, and again and again.
 
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::stats::median::robust_deviation;
@@ -12,8 +12,9 @@ use crate::stats::thresholds::empirical::{BOUND_TO_NEXT_STEP, CLOSE_TO_BOUND, CO
 /// Fewest distinct readings from which a grid can be found.
 const FEWEST_ON_GRID: usize = 6;
 
-/// Most readings beyond a bound, relative to those at it, and the part of them that may be beside another one.
+/// Largest number of readings beyond a bound, relative to those at it.
 const BEYOND: f64 = 0.1;
+/// Largest part of those that follow another one.
 const TOGETHER: f64 = 0.1;
 
 /// The bounds at which readings stopped, in the unit of the readings.
@@ -67,31 +68,36 @@ impl Bounds {
         }
         let ties = counts.iter().filter(|(_, count)| *count > 1).count();
         let continuous = ties <= counts.len() / 50 + 2;
-        let inner = counts.iter().skip(1).rev().skip(1);
+        // The places that may be bounds: each the first reading that is repeated, with nothing but single readings beyond.
+        let is_tied = |place: &usize| counts[*place].1 >= FEWEST_TIES.count();
+        let lowest = (0..counts.len()).find(is_tied).filter(|&place| are_single(readings, counts[place], f64::lt));
+        let highest =
+            (0..counts.len()).rev().find(is_tied).filter(|&place| are_single(readings, counts[place], f64::gt));
+        let last = counts.len().saturating_sub(1);
+        let inner = counts.iter().take(highest.unwrap_or(last)).skip(lowest.unwrap_or(0) + 1);
         let most_repeated = inner.clone().map(|(_, count)| *count).max().unwrap_or(1);
         // A sensor that hangs repeats one; a running median or a sensor that is read too often repeats many.
         let stands_out =
             |count: usize| inner.clone().filter(|(value, times)| *value != 0.0 && *times >= count).count() <= 1;
         let far = CLOSE_TO_BOUND.get() * scatter;
         let is_fine = step.is_some_and(|step| step < COARSE.get() * scatter);
-        // From the extreme inwards.
-        let bound = |values: &mut dyn Iterator<Item = &(f64, usize)>, is_beyond: fn(&f64, &f64) -> bool| {
-            let mut values = values.skip_while(|(_, count)| *count < FEWEST_TIES.count());
-            let ((value, count), next) = (*values.next()?, values.next());
+        let bound = |place: Option<usize>, next: Option<usize>| {
+            let (value, count) = counts[place?];
             // On a fine grid the next step is a fair judge. On a coarse one every level at which the spring settles repeats one reading,
             // and without one any reading may often be the same.
-            let compared = if is_fine { next.map_or(1, |next| next.1) } else { most_repeated };
-            let piled = count >= FEWEST_TIES.count()
-                && (continuous && stands_out(count) || count >= BOUND_TO_NEXT_STEP.count() * compared);
+            let compared =
+                if is_fine { next.and_then(|next| counts.get(next)).map_or(1, |next| next.1) } else { most_repeated };
+            let piled = continuous && stands_out(count) || count >= BOUND_TO_NEXT_STEP.count() * compared;
             // A spring at rest reads exactly zero many times.
-            let is_bound = piled && count < readings.len() && value != 0.0 && stays(readings, value, far);
-            let beyond: Vec<usize> = (0..readings.len()).filter(|&row| is_beyond(&readings[row], &value)).collect();
-            (is_bound && (beyond.is_empty() || are_single(&beyond, readings, value, count))).then_some(value)
+            (piled && count < readings.len() && value != 0.0 && stays(readings, value, far)).then_some(value)
         };
-        Self { upper: bound(&mut counts.iter().rev(), f64::gt), lower: bound(&mut counts.iter(), f64::lt) }
+        Self {
+            upper: bound(highest, highest.and_then(|place| place.checked_sub(1))),
+            lower: bound(lowest, lowest.map(|place| place + 1)),
+        }
     }
 
-    /// Returns true if a reading stopped at a bound.
+    /// Returns true for a reading at a bound or beyond it, which says nothing of the response.
     pub fn stopped(&self, reading: f64) -> bool {
         self.upper.is_some_and(|bound| reading >= bound) || self.lower.is_some_and(|bound| reading <= bound)
     }
@@ -110,13 +116,13 @@ fn stays(reading: &[f64], value: f64, far: f64) -> bool {
     2 * staying >= rows().count()
 }
 
-/// Returns true if the rows `beyond` a value are few and single ones, between `count` readings with the value, to which they return.
-fn are_single(beyond: &[usize], readings: &[f64], value: f64, count: usize) -> bool {
+/// Returns true if no reading is beyond a value, which `count` readings have, or few single ones between those, which return to it.
+fn are_single(readings: &[f64], (value, count): (f64, usize), is_beyond: fn(&f64, &f64) -> bool) -> bool {
+    let beyond: Vec<usize> = (0..readings.len()).filter(|&row| is_beyond(&readings[row], &value)).collect();
     let together = beyond.windows(2).filter(|pair| pair[1] == pair[0] + 1).count();
     let begins = readings.windows(2).filter(|pair| pair[1] == value && pair[0] != value).count();
-    begins >= FEWEST_TIES.count()
-        && beyond.len() as f64 <= BEYOND * count as f64
-        && together as f64 <= TOGETHER * beyond.len() as f64
+    let are_few = beyond.len() as f64 <= BEYOND * count as f64 && together as f64 <= TOGETHER * beyond.len() as f64;
+    beyond.is_empty() || are_few && begins >= FEWEST_TIES.count()
 }
 
 #[cfg(test)]
@@ -179,14 +185,22 @@ mod tests {
                     .collect()
             }
         };
+        let both_ways = |read: Vec<f64>| {
+            let sign = |row: usize| if row % 74 == 0 { -1.0 } else { 1.0 };
+            let within = read.into_iter().map(|reading| reading.clamp(50.0, 350.0)).enumerate();
+            within.map(|(row, y)| if row % 37 == 0 { y + sign(row) * (60.0 + row as f64 / 100.0) } else { y }).collect()
+        };
         for seed in 0..20 {
             assert_eq!(bounds(seed, spoilt(37, 1)), Bounds { upper: Some(350.0), lower: None }, "{seed}");
+            assert_eq!(bounds(seed, both_ways), Bounds { upper: Some(350.0), lower: Some(50.0) }, "{seed}");
             // In succession they are a response.
             assert_eq!(upper(seed, spoilt(200, 8)), None, "{seed}");
         }
         // A sensor that was stuck once, below its highest readings.
-        let stuck = |read: Vec<f64>| (0..read.len()).map(|row| read[if (500..540).contains(&row) { 500 } else { row }]);
-        assert_eq!(upper(0, |read| stuck(read).collect()), None);
+        let stuck = |read: Vec<f64>| {
+            (0..read.len()).map(|row| read[if (500..540).contains(&row) { 500 } else { row }]).collect()
+        };
+        assert_eq!(upper(0, stuck), None);
     }
 
     /// Rounded to much more than the noise, every level of a stair is one reading: the extremes as well, and no step next to them.

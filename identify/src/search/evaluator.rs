@@ -218,7 +218,7 @@ impl Evaluator for Engine<'_> {
 
     fn simpler(&self, model: &Model) -> Vec<Model> {
         let special_case = |(block, point): &(Block, Vec<f64>)| {
-            let (cause, point) = block.effect().special_case(block.form, point)?;
+            let (cause, point) = block.effect().nearest_special_case(block.form, point)?;
             let effect = index_of(cause).filter(|_| self.allows(cause))?;
             Some(model.without(block.effect).with(Block { effect, form: 0 }, point))
         };
@@ -424,6 +424,26 @@ impl<'f> Screening<'f> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::base::Base;
+    use crate::record::data::Data;
+    use crate::record::input::Input;
+    use crate::record::observed::Observed;
+    use simulation::record::{Record, Row};
+
+    #[test]
+    fn a_constant_time_constant_is_simpler_than_one_that_depends_on_the_voltage() {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold);
+        let (observed, base) = (Observed::new(&data), Base::paper());
+        let block = |cause: &str, form| Block { effect: index_of(cause).unwrap(), form };
+        let offset = Model::default().with(block("hysteresis", 0), vec![3.0]);
+        let varying = offset.with(block("voltage-dependent-time-constant", 1), vec![2f64.ln(), 8f64.ln()]);
+        let simpler = Evaluator::simpler(&Engine::new(&data, &observed, &base), &varying);
+        assert_eq!(simpler.len(), 1);
+        assert_eq!(simpler[0].structure(), offset.with(block("time-constant", 0), vec![4f64.ln()]).structure());
+        assert!((simpler[0].point(block("time-constant", 0).effect).unwrap()[0] - 4f64.ln()).abs() < 1e-12);
+        assert!(Evaluator::simpler(&Engine::new(&data, &observed, &base), &offset).is_empty());
+    }
 
     /// Five forms of one effect promise more than one of another.
     #[test]

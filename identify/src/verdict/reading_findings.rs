@@ -88,7 +88,7 @@ pub(crate) fn reading_findings(data: &Data, observed: &Observed, fit: &Fit, isol
                 "{stopped} readings are exactly {}, the {} of all{}",
                 scales.restored(Dimension::Reading, bound),
                 if upper == (scales.reading > 0.0) { "highest" } else { "lowest" },
-                if beyond > 0 { format!(" but {beyond} single ones") } else { String::new() }
+                if beyond > 0 { format!(" but for single ones ({beyond})") } else { String::new() }
             ),
             proved: true,
         });

@@ -13,8 +13,8 @@
 //!         fixed point                        floating point, outside of the tick
 //! ```
 //!
-//! - **What is taken over.** Gain, time constant and share, when the bank names one of them alone, with a 95 % interval that is narrow
-//!   enough ([`Settings::precision`]), while the sensor was trusted since the fault began and the voltage has moved far enough since
+//! - **What is taken over.** Gain, time constant and share, when the bank names one of them alone, and the noise leaves it a 95 % interval that is
+//!   narrow enough ([`Settings::precision`]), while the sensor was trusted since the fault began and the voltage has moved far enough since
 //!   ([`Settings::excitation`]). The size is that of a linear signature; what it leaves is named again and taken over in turn.
 //! - **Bounds.** No parameter leaves its range around the stored model. It moves by at most [`Settings::rate_per_s`], in steps of one
 //!   block, and only where the estimate is near the target and no limit acts.
@@ -55,7 +55,7 @@ pub struct Settings {
     pub gain: f64,
     /// Largest relative change of a parameter in a second, 0.001 to 1.
     pub rate_per_s: f64,
-    /// Largest half width of the 95 % interval of a parameter that is taken over, relative to it, 0.0001 to 0.1.
+    /// Largest half width of the 95 % interval that the noise leaves a parameter that is taken over, relative to it, 0.0001 to 0.1.
     pub precision: f64,
     /// Distance between the lowest and the highest voltage since the fault began, as a part of the amplifier's range, 0.01 to 1.
     pub excitation: f64,

@@ -5,6 +5,7 @@ worker, a scheduler or a machine. The files are the only state. A batch that is 
 dead, writes the same rows again; every reader takes one row for each record and key.
 """
 
+import errno
 import hashlib
 import io
 import itertools
@@ -187,7 +188,7 @@ def _write(out, name, write, content=""):
         with _replacing(out, name) as file:
             write(file)
         return
-    except BadInput:
+    except (BadInput, MemoryError):
         raise
     except Exception as error:
         why = getattr(error, "strerror", None) or reason(error)
@@ -205,9 +206,9 @@ def _replacing(out, name):
         with fs.open(partial, "wb") as file:
             yield file
             file.flush()
-            # Only a local file has a number; there the content has to be on the disk before the name is.
+            # Only a local file has a number; there the content has to be on the disk before the name is, where the mount can tell.
             with suppress(io.UnsupportedOperation, AttributeError):
-                os.fsync(file.fileno())
+                _synchronise(file.fileno())
         fs.mv(partial, final)
     except BaseException:
         # What went wrong first is reported.
@@ -215,3 +216,12 @@ def _replacing(out, name):
             if fs.exists(partial):
                 fs.rm(partial)
         raise
+
+
+def _synchronise(number):
+    """Wait until the open file with a number is on its disk; some mounts, of networks and in user space, have no such call."""
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
