@@ -194,7 +194,7 @@ mod tests {
             assert_eq!(bounds(seed, spoilt(37, 1)), Bounds { upper: Some(350.0), lower: None }, "{seed}");
             assert_eq!(bounds(seed, both_ways), Bounds { upper: Some(350.0), lower: Some(50.0) }, "{seed}");
             // In succession they are a response.
-            assert_eq!(upper(seed, spoilt(200, 8)), None, "{seed}");
+            assert_eq!(upper(seed, spoilt(100, 8)), None, "{seed}");
         }
         // A sensor that was stuck once, below its highest readings.
         let stuck = |read: Vec<f64>| {
