@@ -237,7 +237,10 @@ fn a_schedule_is_played_and_recorded() {
     terminal.wait_for("REC out.csv");
     terminal.press("p");
     terminal.wait_for("not armed: a schedule is played by an armed MCU");
-    terminal.press("ap");
+    terminal.press("a");
+    // Its state comes with the telemetry.
+    terminal.wait_for(" ARMED ");
+    terminal.press("p");
     terminal.wait_for("PLAY");
     terminal.wait_for("is over; the target stays");
     assert_eq!(mcu.with(|shared| shared.sample.target.to_f64()), 150.0);
