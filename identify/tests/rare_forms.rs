@@ -214,13 +214,12 @@ fn a_limit_of_the_amplifier_that_is_approached_gradually_has_a_knee() {
 
 #[test]
 fn a_limit_of_the_amplifier_for_one_sign_is_found() {
-    let limits: [(fn(f64, f64) -> f64, _, _); 2] =
-        [(|v, _| v.min(330.0), "limit_v", 330.0), (|v, _| v.max(-270.0), "lower_limit_v", -270.0)];
-    for (amplified_v, name, limit_v) in limits {
+    let found_v = |amplified_v: fn(f64, f64) -> f64, name: &str| {
         let report = diagnosed_from(-FULL_SCALE_V, amplified_v, |_| TAU_S, plain);
-        let found_v = of_only_finding(&report, "amplifier-limit", name).value;
-        assert!((found_v - limit_v).abs() < 2.0, "{report:#?}");
-    }
+        of_only_finding(&report, "amplifier-limit", name).value
+    };
+    assert!((found_v(|volts, _| volts.min(330.0), "limit_v") - 330.0).abs() < 2.0);
+    assert!((found_v(|volts, _| volts.max(-270.0), "lower_limit_v") + 270.0).abs() < 2.0);
 }
 
 /// The link after a sensor that stops at 230 V spoils single readings.
