@@ -186,9 +186,11 @@ mod tests {
             }
         };
         let both_ways = |read: Vec<f64>| {
-            let sign = |row: usize| if row % 74 == 0 { -1.0 } else { 1.0 };
+            let sign = |row: usize| if row.is_multiple_of(74) { -1.0 } else { 1.0 };
             let within = read.into_iter().map(|reading| reading.clamp(50.0, 350.0)).enumerate();
-            within.map(|(row, y)| if row % 37 == 0 { y + sign(row) * (60.0 + row as f64 / 100.0) } else { y }).collect()
+            within
+                .map(|(row, y)| if row.is_multiple_of(37) { y + sign(row) * (60.0 + row as f64 / 100.0) } else { y })
+                .collect()
         };
         for seed in 0..20 {
             assert_eq!(bounds(seed, spoilt(37, 1)), Bounds { upper: Some(350.0), lower: None }, "{seed}");
