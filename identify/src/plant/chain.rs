@@ -195,11 +195,11 @@ impl<'a> Chain<'a> {
     /// Maps the commanded voltage to the voltage on the spring's electrodes, or to its magnitude where that alone counts.
     pub fn amplify(&self, signal: &mut Signal) {
         if self.limits_v.iter().any(|limit| limit.is_finite()) {
+            // Zero at 0 V, which a large knee reaches.
+            let at_rest = self.limits_v.map(|limit_v| at_most(0.0, limit_v, self.knee_v));
             signal.map(|voltage| {
-                let limit_v = self.limits_v[usize::from(voltage < 0.0)];
-                // Zero at 0 V, which a large knee reaches.
-                let below = |voltage: f64| at_most(voltage, limit_v, self.knee_v);
-                if limit_v.is_finite() { (below(voltage.abs()) - below(0.0)).copysign(voltage) } else { voltage }
+                let sign = usize::from(voltage < 0.0);
+                (at_most(voltage.abs(), self.limits_v[sign], self.knee_v) - at_rest[sign]).copysign(voltage)
             });
         }
         signal.before = self.initial_v.unwrap_or(signal.before);

@@ -79,6 +79,10 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let [low, high] = range(&value);
     let rounding = ROUNDING * (high - low);
     let runs = runs(value.len(), |row| (value[row] - value[row - 1]).abs() <= rounding);
+    // Shorter ones prove nothing, and most records have no other.
+    if runs.iter().all(|run| run.len() < FEWEST_TIES.count()) {
+        return None;
+    }
     let readings = Readings::of(value, voltage, rounding, &runs)?;
     // The first readings may be those of a spring at rest in a simulation.
     let Bounds { upper, lower } = Bounds::of_file(&readings.value);

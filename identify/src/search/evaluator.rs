@@ -222,17 +222,18 @@ impl Evaluator for Engine<'_> {
             let effect = index_of(cause).filter(|_| self.allows(cause))?;
             Some(model.without(block.effect).with(Block { effect, form: 0 }, point))
         };
-        let special_cases = model.blocks.iter().filter_map(special_case);
-        let with_gain = |gain_error: usize, gain: f64| {
+        let mut simpler: Vec<Model> = model.blocks.iter().filter_map(special_case).collect();
+        if let Some(gain_error) = index_of("gain-error")
+            && let Some(&[gain]) = model.point(gain_error)
+        {
             let rest = model.without(gain_error);
-            let merged = |(block, point): &(Block, Vec<f64>)| {
+            let with_gain = |(block, point): &(Block, Vec<f64>)| {
                 let (form, point) = block.effect().with_gain(block.form, point, gain, self.data)?;
                 Some(rest.without(block.effect).with(Block { form, ..*block }, point))
             };
-            rest.blocks.iter().filter_map(merged).collect::<Vec<_>>()
-        };
-        let gain = index_of("gain-error").and_then(|effect| Some((effect, *model.point(effect)?.first()?)));
-        special_cases.chain(gain.into_iter().flat_map(|(effect, gain)| with_gain(effect, gain))).collect()
+            simpler.extend(rest.blocks.iter().filter_map(with_gain));
+        }
+        simpler
     }
 
     fn penalty_factor(&mut self, fit: &Fit) -> f64 {
