@@ -25,8 +25,9 @@ fn times_s(data: &Data) -> (f64, f64) {
     (shortest, (LONGEST * REFERENCE_TIME_CONSTANT_S).max(2.0 * shortest))
 }
 
-/// Distances of initial points from the nominal share, on both sides of it: a predicted gain counts changes towards the point only.
-const INITIAL_CHANGES: [f64; 4] = [-0.2, -0.04, 0.04, 0.2];
+/// Distances of initial points from the nominal share: a predicted gain counts changes towards the point only. One on each side, as the
+/// response is linear in the share: of two with the same predicted gain rounding would choose.
+const INITIAL_CHANGES: [f64; 2] = [-0.1, 0.1];
 
 impl Effect for InstantaneousShare {
     fn cause(&self) -> &'static str {
