@@ -207,18 +207,20 @@ impl Signal {
         self.rebuilt(|Piece { duration_s, from, to }, pieces| {
             let slope = if duration_s > 0.0 { (to - from) / duration_s } else { 0.0 };
             let mut left = duration_s;
-            if from != now || slope > rising || -slope > falling {
-                let ahead = if from == now { slope } else { from - now };
+            if from != now {
+                let ahead = from - now;
                 let rate = if ahead > 0.0 { rising } else { -falling };
                 // Time until the output meets the line of the input.
                 let closing = rate - slope;
-                let meets = if closing * ahead > 0.0 { (from - now) / closing } else { f64::INFINITY };
+                let meets = if closing * ahead > 0.0 { ahead / closing } else { f64::INFINITY };
                 let taken = meets.clamp(0.0, left);
                 pieces.push(Piece { duration_s: taken, from: now, to: now + rate * taken });
                 now += rate * taken;
                 left -= taken;
             }
             if left > ROUNDING_S || duration_s == 0.0 && from == now {
+                // The line may be steeper than the rate of the other direction.
+                let slope = slope.clamp(-falling, rising);
                 pieces.push(Piece { duration_s: left, from: now, to: now + slope * left });
                 now += slope * left;
             }
@@ -426,6 +428,15 @@ mod tests {
             assert!((got - expected).abs() < 1e-9, "{got} {expected}");
         }
         assert_eq!(rows(&step().slewed(1e6, 1e6)), [0.0, 0.0, 100.0, 100.0, 100.0]);
+    }
+
+    #[test]
+    fn a_line_that_crosses_a_slewed_output_is_followed_at_the_rate() {
+        let record = Record::parse("r", "time_s,voltage_v\n0,0\n1,100\n2,-100\n", "stiffness").unwrap();
+        let triangle = Signal::new(&Schedule::from_record(&record, Between::Linear), &[0.0, 1.0, 2.0], 0.0);
+        // They meet at 1.25 s and 50 V, where the line falls by 200 V/s.
+        let got = rows(&triangle.slewed(40.0, 40.0));
+        assert!(got.iter().zip([0.0, 40.0, 20.0]).all(|(got, expected)| (got - expected).abs() < 1e-9), "{got:?}");
     }
 
     /// Compared with steps of a thousandth of a row.
