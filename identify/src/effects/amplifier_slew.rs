@@ -12,6 +12,7 @@
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity, logarithms, table};
+use crate::effects::series_lag;
 use crate::plant::chain::Chain;
 use crate::record::data::Data;
 
@@ -99,6 +100,11 @@ impl Effect for AmplifierSlew {
     /// An amplifier that reaches its rate in no step but the largest is a lag.
     fn is_another_cause(&self, form: usize, point: &[f64], data: &Data) -> bool {
         form == WITH_TIME_CONSTANT && (point[0] + point[1]).exp() > LARGEST_LAG * stroke(data)
+    }
+
+    /// Returns the lag of an operational amplifier that never reaches its rate.
+    fn nearest_special_case(&self, form: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+        (form == WITH_TIME_CONSTANT).then(|| ("series-lag", series_lag::IN_FRONT, vec![point[1]]))
     }
 
     /// The rate of a charger is that at the largest voltage.

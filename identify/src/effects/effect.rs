@@ -199,9 +199,9 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Returns the cause that is a special case of the effect, and the point of that cause's first form nearest to a point; `None` if it
-    /// has no special case.
-    fn nearest_special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+    /// Returns the cause that is a special case of a form of the effect, with the form of that cause and its point nearest to a point;
+    /// `None` if it has no special case.
+    fn nearest_special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
         None
     }
 

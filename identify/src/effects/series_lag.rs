@@ -25,7 +25,7 @@ pub(super) struct SeriesLag;
 
 const ONE: usize = 0;
 const TWO: usize = 1;
-const IN_FRONT: usize = 2;
+pub(super) const IN_FRONT: usize = 2;
 const DAMPED: usize = 3;
 const MEAN: usize = 4;
 /// Ratio of two heights of steps that are different.

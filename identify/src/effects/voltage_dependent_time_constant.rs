@@ -52,8 +52,8 @@ impl Effect for VoltageDependentTimeConstant {
     }
 
     /// Returns the constant time constant nearest to a point: the geometric mean of both ends. It does not see a nominal ratio of them.
-    fn nearest_special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, Vec<f64>)> {
-        Some(("time-constant", vec![0.5 * (point[0] + point[1])]))
+    fn nearest_special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+        Some(("time-constant", 0, vec![0.5 * (point[0] + point[1])]))
     }
 
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {

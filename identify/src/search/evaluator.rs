@@ -218,9 +218,9 @@ impl Evaluator for Engine<'_> {
 
     fn simpler(&self, model: &Model) -> Vec<Model> {
         let special_case = |(block, point): &(Block, Vec<f64>)| {
-            let (cause, point) = block.effect().nearest_special_case(block.form, point)?;
-            let effect = index_of(cause).filter(|_| self.allows(cause))?;
-            Some(model.without(block.effect).with(Block { effect, form: 0 }, point))
+            let (cause, form, point) = block.effect().nearest_special_case(block.form, point)?;
+            let effect = index_of(cause).filter(|effect| self.allows(cause) && !model.has(*effect))?;
+            Some(model.without(block.effect).with(Block { effect, form }, point))
         };
         let mut simpler: Vec<Model> = model.blocks.iter().filter_map(special_case).collect();
         if let Some(gain_error) = index_of("gain-error")
@@ -431,10 +431,15 @@ mod tests {
     use crate::record::observed::Observed;
     use simulation::record::{Record, Row};
 
+    /// A spring at 100 V.
+    fn data() -> Data {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
+        Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold)
+    }
+
     #[test]
     fn a_constant_time_constant_is_simpler_than_one_that_depends_on_the_voltage() {
-        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 100.0, measured: Some(100.0) };
-        let data = Data::new(&Record { name: String::new(), rows: (0..20).map(row).collect() }, Input::Hold);
+        let data = data();
         let (observed, base) = (Observed::new(&data), Base::paper());
         let block = |cause: &str, form| Block { effect: index_of(cause).unwrap(), form };
         let offset = Model::default().with(block("hysteresis", 0), vec![3.0]);
@@ -444,6 +449,20 @@ mod tests {
         assert_eq!(simpler[0].structure(), offset.with(block("time-constant", 0), vec![4f64.ln()]).structure());
         assert!((simpler[0].point(block("time-constant", 0).effect).unwrap()[0] - 4f64.ln()).abs() < 1e-12);
         assert!(Evaluator::simpler(&Engine::new(&data, &observed, &base), &offset).is_empty());
+    }
+
+    #[test]
+    fn a_lag_in_front_is_simpler_than_an_amplifier_that_never_reaches_its_rate() {
+        let data = data();
+        let (observed, base) = (Observed::new(&data), Base::paper());
+        let engine = Engine::new(&data, &observed, &base);
+        let block = |cause: &str, form| Block { effect: index_of(cause).unwrap(), form };
+        let amplifier = Model::default().with(block("amplifier-slew", 3), vec![1e6f64.ln(), 2f64.ln()]);
+        let lag = Model::default().with(block("series-lag", 2), vec![2f64.ln()]);
+        assert_eq!(Evaluator::simpler(&engine, &amplifier), [lag]);
+        // Another lag has its place.
+        let both = amplifier.with(block("series-lag", 0), vec![0.0]);
+        assert!(Evaluator::simpler(&engine, &both).is_empty());
     }
 
     /// Five forms of one effect promise more than one of another.
