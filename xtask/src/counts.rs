@@ -19,7 +19,7 @@ enum Source {
 use Source::{Command, Test};
 
 /// Everything that is counted, by what it shows.
-const SECTIONS: [(&str, &[Source]); 6] = [
+const SECTIONS: [(&str, &[Source]); 7] = [
     (
         "inputs tried",
         &[
@@ -49,6 +49,15 @@ const SECTIONS: [(&str, &[Source]); 6] = [
     (
         "ticks without a violation",
         &[Command("soak", "cargo xtask soak"), Command("soak-emulated", "cargo xtask soak --emulated")],
+    ),
+    (
+        "checks without a finding",
+        &[
+            Command("sanitize-miri", "cargo xtask sanitize --only miri"),
+            Command("sanitize-address", "cargo xtask sanitize --only address"),
+            Command("deny", "cargo xtask deny"),
+            Command("reproducible", "cargo xtask reproducible"),
+        ],
     ),
     (
         "nothing lost",

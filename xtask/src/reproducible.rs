@@ -8,6 +8,7 @@ use xtask::build::{self, Board};
 use xtask::files;
 use xtask::segments;
 use xtask::shell;
+use xtask::tally::Tally;
 use xtask::variant::Variant;
 
 /// Names of the two folders under the target directory. A path's length once changed the size of an image.
@@ -18,6 +19,7 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
     let target = shell::target_directory()?.join("reproducible");
     let copies = FOLDERS.map(|name| target.join(name));
     copies.iter().try_for_each(|folder| copy_sources(folder))?;
+    let mut counts = Vec::new();
     for board in Board::ALL {
         let [one, other] = [&copies[0], &copies[1]].map(|root| build::image_of_copy(root, &variant.features(), board));
         let (one, other) = (build::read(&one?)?, build::read(&other?)?);
@@ -27,8 +29,11 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
         ensure!(flash == other_flash, "{}: the flash differs {}", board.name(), first(&flash, &other_flash));
         ensure!(one == other, "{}: the ELF file differs {}", board.name(), first(&one, &other));
         println!("{}: {} bytes of flash and {} bytes of ELF agree", board.name(), flash.len(), one.len());
+        for (part, bytes) in [("flash", &flash), ("ELF", &one)] {
+            counts.push((format!("bytes of {part} that agree, {}", board.name()), bytes.len() as u64));
+        }
     }
-    Ok(())
+    Tally::now(counts)?.write(&variant.tally("reproducible"))
 }
 
 /// Where two files differ first.

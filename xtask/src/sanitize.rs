@@ -6,6 +6,7 @@
 
 use anyhow::{Context, Result};
 use xtask::shell;
+use xtask::tally::Tally;
 
 use crate::nightly;
 
@@ -36,12 +37,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let target = shell::target_directory()?;
     if chosen("miri") {
         nightly::install("miri")?;
+        let mut tests = 0;
         for packages in INTERPRETED {
             let mut command = nightly::cargo();
             command.args(["miri", "test"]).args(*packages);
             command.env("PROPTEST_CASES", CASES).env("MIRIFLAGS", "-Zmiri-disable-isolation");
-            shell::run(command.env("CARGO_TARGET_DIR", target.join("miri")))?;
+            tests += passed(&shell::run_and_read(command.env("CARGO_TARGET_DIR", target.join("miri")))?);
         }
+        Tally::now([("tests under Miri, without undefined behaviour".to_owned(), tests)])?.write("sanitize-miri")?;
     }
     if chosen("address") {
         nightly::install("rust-src")?;
@@ -50,7 +53,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         command.args(["test", "-p", "vsj-model", "-p", "vsj-link", "-p", "firmware", "--tests"]);
         command.args(["--features", FEATURES, "--target", &host]);
         command.env("RUSTFLAGS", "-Zsanitizer=address").env("CARGO_TARGET_DIR", target.join("sanitize"));
-        shell::run(&mut command)?;
+        let tests = passed(&shell::run_and_read(&mut command)?);
+        let what = "tests under the address sanitizer, without an invalid access".to_owned();
+        Tally::now([(what, tests)])?.write("sanitize-address")?;
     }
     println!("no undefined behaviour, no overflow, no invalid access");
     Ok(())
@@ -61,4 +66,22 @@ fn host() -> Result<String> {
     let text = shell::output(shell::command("rustc").arg("-vV"))?;
     let host = text.lines().find_map(|line| line.strip_prefix("host: ")).context("rustc names no host")?;
     Ok(host.to_owned())
+}
+
+/// How many tests have passed, of all test programs in the output of `cargo test`.
+fn passed(output: &str) -> u64 {
+    let result = |line: &str| line.strip_prefix("test result: ok. ")?.split_once(" passed;")?.0.parse::<u64>().ok();
+    output.lines().filter_map(result).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tests_of_all_programs_are_counted() {
+        let output = "running 3 tests\ntest result: ok. 2 passed; 0 failed; 1 ignored; 0 measured\n\nrunning 40 tests\n\
+                      test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 3 filtered out\n";
+        assert_eq!(passed(output), 42);
+    }
 }

@@ -1,7 +1,7 @@
 //! Starts other programs: prints the command line first, and returns an error that names the program when it fails.
 
 use std::ffi::OsStr;
-use std::io::{self, ErrorKind};
+use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -38,6 +38,24 @@ pub fn run(command: &mut Command) -> Result<()> {
         bail!("`{line}` failed ({status})");
     }
     Ok(())
+}
+
+/// Runs `command` as [`run`] does, and returns its stdout as well.
+pub fn run_and_read(command: &mut Command) -> Result<String> {
+    let line = line(command);
+    eprintln!("$ {line}");
+    let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| not_started(command, e))?;
+    let mut text = String::new();
+    for line in child.stdout.take().into_iter().flat_map(|stdout| BufReader::new(stdout).lines()) {
+        let line = line?;
+        eprintln!("{line}");
+        text += &(line + "\n");
+    }
+    let status = child.wait()?;
+    if !status.success() {
+        bail!("`{line}` failed ({status})");
+    }
+    Ok(text)
 }
 
 /// Runs `command` to its end and returns its stdout. An exit code other than 0 is an error.
@@ -81,4 +99,15 @@ pub(crate) fn line(command: &Command) -> String {
     let set = command.get_envs().filter_map(|(key, value)| Some(format!("{}={}", key.display(), value?.display())));
     let words = [program].into_iter().chain(command.get_args()).map(|word| word.display().to_string());
     set.chain(words).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_command_prints_is_read_and_its_failure_is_an_error() {
+        assert_eq!(run_and_read(command("echo").arg("one\ntwo")).unwrap(), "one\ntwo\n");
+        assert!(run_and_read(&mut command("false")).unwrap_err().to_string().contains("`false` failed"));
+    }
 }

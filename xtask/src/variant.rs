@@ -84,6 +84,11 @@ impl Variant {
     pub fn features(self) -> Vec<&'static str> {
         [self.controller.features(), self.limit_v.features()].concat()
     }
+
+    /// Name of the counts of a command that was run on this variant.
+    pub fn tally(self, command: &str) -> String {
+        [&[command], self.features().as_slice()].concat().join("-")
+    }
 }
 
 #[cfg(test)]
@@ -107,6 +112,8 @@ mod tests {
         ] {
             assert_eq!(parse(line).unwrap().features(), features, "{line}");
         }
+        // As `cargo xtask counts` looks for it.
+        assert_eq!(parse("--controller fast --limit-v 1000").unwrap().tally("boot"), "boot-fast-kilovolt");
         let error = parse("--limit-v 850").unwrap_err().to_string();
         assert!(error.contains("850") && error.contains("[possible values: 700, 1000]"), "{error}");
     }

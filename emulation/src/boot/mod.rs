@@ -149,5 +149,5 @@ fn one(variant: Variant) -> Result<()> {
     // All runs but the one without a mishap and the one with a host.
     let runs = output.as_object().context("no runs")?.values().filter(|run| !run.is_null()).count() as u64;
     let faults = ("faults injected in the image that is flashed, on register models".to_owned(), runs - 2);
-    Tally::now([faults])?.write(&["boot"].into_iter().chain(variant.features()).collect::<Vec<_>>().join("-"))
+    Tally::now([faults])?.write(&variant.tally("boot"))
 }
