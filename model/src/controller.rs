@@ -12,8 +12,9 @@
 //! - *bumpless transfer*: a change of the configuration that does not move the voltage.
 //!
 //! [`Config::tick`] does, in this order: target into the amplifier's range, correction by the sensor, pre-compensator,
-//! amplifier limits and rounding, estimator on the applied voltage, integrator. All types are generic over the spring;
-//! without a parameter it is the plain one, [`Plant`].
+//! amplifier limits and rounding, estimator on the applied voltage, integrator. What is remembered follows from the voltages that were put
+//! out, from targets and from readings, and not from what a limit has held back. All types are generic over the spring; without a parameter
+//! it is the plain one, [`Plant`].
 
 use crate::amplifier::{self, Amplifier, Drive, Limits};
 use crate::error::OutOfRange;
@@ -377,3 +378,6 @@ impl<E: Estimator> Config<E> {
         }
     }
 }
+
+#[cfg(all(test, feature = "robust"))]
+mod tests;
