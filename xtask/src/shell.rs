@@ -3,9 +3,9 @@
 use std::ffi::OsStr;
 use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, ensure};
 use serde_json::Value;
 
 /// Target triple of the MCU.
@@ -31,19 +31,14 @@ pub fn cargo() -> Command {
 /// Prints `command` to stderr and runs it to its end. Its stdout goes to stderr, because stdout is reserved for
 /// results. An exit code other than 0 is an error.
 pub fn run(command: &mut Command) -> Result<()> {
-    let line = line(command);
-    eprintln!("$ {line}");
+    eprintln!("$ {}", line(command));
     let status = command.stdout(Stdio::from(io::stderr())).status().map_err(|e| not_started(command, e))?;
-    if !status.success() {
-        bail!("`{line}` failed ({status})");
-    }
-    Ok(())
+    succeeded(command, status)
 }
 
 /// Runs `command` as [`run`] does, and returns its stdout as well.
 pub fn run_and_read(command: &mut Command) -> Result<String> {
-    let line = line(command);
-    eprintln!("$ {line}");
+    eprintln!("$ {}", line(command));
     let mut child = command.stdout(Stdio::piped()).spawn().map_err(|e| not_started(command, e))?;
     let mut text = String::new();
     for line in child.stdout.take().into_iter().flat_map(|stdout| BufReader::new(stdout).lines()) {
@@ -51,19 +46,14 @@ pub fn run_and_read(command: &mut Command) -> Result<String> {
         eprintln!("{line}");
         text += &(line + "\n");
     }
-    let status = child.wait()?;
-    if !status.success() {
-        bail!("`{line}` failed ({status})");
-    }
+    succeeded(command, child.wait()?)?;
     Ok(text)
 }
 
 /// Runs `command` to its end and returns its stdout. An exit code other than 0 is an error.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command.stderr(Stdio::inherit()).output().map_err(|e| not_started(command, e))?;
-    if !output.status.success() {
-        bail!("`{}` failed ({})", line(command), output.status);
-    }
+    succeeded(command, output.status)?;
     String::from_utf8(output.stdout).with_context(|| format!("`{}` printed bytes that are not UTF-8", line(command)))
 }
 
@@ -82,6 +72,12 @@ pub fn metadata() -> Result<Value> {
 pub fn target_directory() -> Result<PathBuf> {
     let metadata = metadata()?;
     Ok(metadata["target_directory"].as_str().context("cargo metadata names no target directory")?.into())
+}
+
+/// An error that names the command if it ended with another exit code than 0.
+fn succeeded(command: &Command, status: ExitStatus) -> Result<()> {
+    ensure!(status.success(), "`{}` failed ({status})", line(command));
+    Ok(())
 }
 
 fn not_started(command: &Command, error: io::Error) -> anyhow::Error {
