@@ -172,7 +172,7 @@ def programs(tmp_path):
             it.wait()
 
     try:
-        until(file.exists)
+        until(lambda: file.exists() and file.read_text().endswith("}"))
         address = json.loads(file.read_text())["address"]
 
         def fleet_until_killed(victim, folder, out, *words):
