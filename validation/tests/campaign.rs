@@ -24,26 +24,26 @@ fn outcomes(jobs: &[Job]) -> (Vec<Outcome>, Summary, String) {
     (outcomes, summary, wrong)
 }
 
-/// 180 records. The criterion is 99 %, which allows one of 180 records to be missed.
+/// 114 records. The criterion is 99 %, which allows one of them to be missed.
 #[test]
 fn every_single_effect_is_named() {
-    let (outcomes, summary, wrong) = outcomes(&part::singles(FIRST, 10));
+    let (outcomes, summary, wrong) = outcomes(&part::singles(FIRST, 6));
     assert!(summary.first >= 0.99, "first finding: {}\n{wrong}", summary.first);
     assert!(summary.nothing_extra >= 0.98, "nothing else: {}\n{wrong}", summary.nothing_extra);
     for accuracy in &summary.parameters {
         assert!(accuracy.median_error <= 0.05, "{accuracy:?}");
     }
-    // About 300 intervals, not all independent: 95 % less three standard deviations and a margin.
+    // About 180 intervals, not all independent: 95 % less three standard deviations and a margin.
     let bounds: Vec<bool> = outcomes.iter().flat_map(|o| &o.parameters).map(|estimate| estimate.covered).collect();
     let covered = bounds.iter().filter(|covered| **covered).count() as f64 / bounds.len() as f64;
     assert!((0.88..=0.995).contains(&covered), "the 95 % intervals cover {covered}");
     assert!(summary.held_out_ratio.is_some_and(|ratio| ratio <= 1.1), "held-out error: {:?}", summary.held_out_ratio);
 }
 
-/// 40 records, with other forms than the records of single effects.
+/// 24 records, with other forms than the records of single effects.
 #[test]
 fn every_effect_in_another_form_is_named() {
-    let (_, summary, wrong) = outcomes(&part::forms(FIRST, 5));
+    let (_, summary, wrong) = outcomes(&part::forms(FIRST, 3));
     assert!(summary.all_named >= 0.9, "{}\n{wrong}", summary.all_named);
 }
 
@@ -54,27 +54,27 @@ fn the_papers_spring_gets_no_finding() {
     assert!(1.0 - summary.nothing_extra <= 0.025, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 58 records, every second of the pairs of causes of different blocks.
+/// 29 records, every fourth of the pairs of causes of different blocks.
 #[test]
 fn two_effects_are_both_named() {
-    let jobs: Vec<Job> = part::pairs(FIRST, 1).into_iter().step_by(2).collect();
+    let jobs: Vec<Job> = part::pairs(FIRST, 1).into_iter().step_by(4).collect();
     let (_, summary, wrong) = outcomes(&jobs);
     assert!(summary.all_named >= 0.93, "{}\n{wrong}", summary.all_named);
     assert!(summary.nothing_extra >= 0.93, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 20 records.
+/// 12 records.
 #[test]
 fn three_effects_are_all_named() {
-    let (_, summary, wrong) = outcomes(&part::triples(FIRST, 20));
+    let (_, summary, wrong) = outcomes(&part::triples(FIRST, 12));
     assert!(summary.all_named >= 0.8, "{}\n{wrong}", summary.all_named);
     assert!(summary.nothing_extra >= 0.9, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 72 records, 1.5 times as large as an oracle detector needs to distinguish each effect from every other single cause.
+/// 38 records, 1.5 times as large as an oracle detector needs to distinguish each effect from every other single cause.
 #[test]
 fn effects_of_1_5_times_the_isolable_size_are_named() {
-    let jobs: Vec<Job> = part::singles(FIRST + 1, 4);
+    let jobs: Vec<Job> = part::singles(FIRST + 1, 2);
     let one = |job: &Job| {
         let record = job.recipe.draw(job.seed);
         let size = detectable::size(&record).expect("effects of full size can be detected");
@@ -83,29 +83,29 @@ fn effects_of_1_5_times_the_isolable_size_are_named() {
     let outcomes: Vec<Outcome> = jobs.par_iter().map(one).collect();
     let named = outcomes.iter().filter(|outcome| outcome.all_named()).count();
     println!("{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
-    // The criterion is 95 %; 60 are named today. Each is a borderline case: other held-out segments changed 63 to 60.
-    assert!(named >= 56, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
+    // The criterion is 95 %; 32 are named today. Each is a borderline case, which other held-out segments may change.
+    assert!(named >= 28, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
 }
 
-/// 27 records, every second pair at full size. Today all begin with a true cause and none has an untrue name.
+/// 14 records, every fourth pair at full size. Today all begin with a true cause and none has an untrue name.
 #[test]
 fn pairs_that_share_a_stage_begin_with_a_true_cause() {
     let full_size = shared::cases(FIRST, 1).into_iter().filter(|case| case.kinds == ["full size"]);
-    let cases: Vec<_> = full_size.step_by(2).collect();
+    let cases: Vec<_> = full_size.step_by(4).collect();
     let answers = graded(&cases);
     let count = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
-    assert!(count(|answer| answer.first_is_right) >= 24, "{}", answer_table::wrong(&answers));
-    assert!(count(Answer::is_sure_and_wrong) <= 3, "{}", answer_table::wrong(&answers));
+    assert!(count(|answer| answer.first_is_right) >= 12, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_sure_and_wrong) <= 2, "{}", answer_table::wrong(&answers));
 }
 
-/// 44 records, every third of the plain steps.
+/// 22 records, every sixth of the plain steps.
 #[test]
 fn plain_steps_get_no_confident_wrong_name() {
-    let cases: Vec<_> = steps::cases(FIRST, 1).into_iter().step_by(3).collect();
+    let cases: Vec<_> = steps::cases(FIRST, 1).into_iter().step_by(6).collect();
     let answers = graded(&cases);
     let count = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
-    assert!(count(Answer::is_right) + count(Answer::is_honest) >= 38, "{}", answer_table::wrong(&answers));
-    assert!(count(Answer::is_sure_and_wrong) <= 3, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_right) + count(Answer::is_honest) >= 19, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_sure_and_wrong) <= 2, "{}", answer_table::wrong(&answers));
 }
 
 fn graded(cases: &[Case]) -> Vec<Answer> {

@@ -27,16 +27,14 @@ fn diagnosis_of(gain: f64, seed: u64, part: &str, relaxation: &str) -> Value {
 #[test]
 fn it_is_taken_out_and_what_is_wrong_beside_it_is_named() {
     for (seed, (name, part, relaxation)) in PARTS.into_iter().enumerate() {
-        // A law times a gain is another law.
-        let gains = if name == "law" { &[(1.0, None)][..] } else { &[(1.0, None), (1.1, Some("gain-error"))] };
-        for &(gain, wrong) in gains {
-            let report = diagnosis_of(gain, seed as u64, part, relaxation);
-            assert_eq!(report["take_out"], serde_json::json!([name]), "{report}");
-            assert_eq!(report["verdict"], "explained", "{name}: {report}");
-            assert_eq!(causes(&report), Vec::from_iter(wrong), "{name}: {report}");
-            let [before, after] = ["baseline", "extended"].map(|of| report[of]["held_out_rmse"].as_f64().unwrap());
-            assert!(after < 1.1 && before > 1.2 * after, "{name}: {report}");
-        }
+        // Beside every second part; a law times a gain is another law.
+        let (gain, wrong) = if seed % 2 == 0 { (1.1, Some("gain-error")) } else { (1.0, None) };
+        let report = diagnosis_of(gain, seed as u64, part, relaxation);
+        assert_eq!(report["take_out"], serde_json::json!([name]), "{report}");
+        assert_eq!(report["verdict"], "explained", "{name}: {report}");
+        assert_eq!(causes(&report), Vec::from_iter(wrong), "{name}: {report}");
+        let [before, after] = ["baseline", "extended"].map(|of| report[of]["held_out_rmse"].as_f64().unwrap());
+        assert!(after < 1.1 && before > 1.2 * after, "{name}: {report}");
     }
 }
 

@@ -303,27 +303,27 @@ mod tests {
         }
     }
 
-    /// Of the sizes that are reported with the right name, at least 93 % are within their 95 % intervals, those of each cause but two at
+    /// Of the sizes that are reported with the right name, at least 93 % are within their 95 % intervals, those of each cause but one at
     /// most; half of the intervals of faults of a quarter of full size are narrower than a tenth of it.
     #[test]
     fn intervals_contain_the_true_size() {
         let faults = Fault::all().into_iter().filter(|fault| fault.has_signature());
         let (mut inside, mut all, mut widths) = (0, 0, Vec::new());
         // Noise of its own in each run.
-        for (fault, first) in faults.zip((400_000..).step_by(8)) {
-            let size = |seed: u64| if seed < first + 4 { 1.0 } else { 0.25 };
-            let sizes: Vec<(f64, Size)> = (first..first + 8)
+        for (fault, first) in faults.zip((400_000..).step_by(4)) {
+            let size = |seed: u64| if seed < first + 2 { 1.0 } else { 0.25 };
+            let sizes: Vec<(f64, Size)> = (first..first + 4)
                 .into_par_iter()
                 .filter_map(|seed| Some((size(seed), reported(fault, size(seed), 0.2, seed).unwrap()?)))
                 .collect();
             let right = sizes.iter().filter(|(_, size)| size.error.abs() <= size.half_width).count();
-            assert!(right + 2 >= sizes.len(), "{fault:?}: {sizes:?}");
+            assert!(right + 1 >= sizes.len(), "{fault:?}: {sizes:?}");
             (inside, all) = (inside + right, all + sizes.len());
             let relative = |(_, size): &(f64, Size)| size.half_width / size.truth.abs();
             widths.extend(sizes.iter().filter(|(size, _)| *size < 1.0).map(relative));
         }
         println!("{inside} of {all}");
-        assert!(all > 70 && 100 * inside >= 93 * all, "{inside} of {all}");
+        assert!(all > 35 && 100 * inside >= 93 * all, "{inside} of {all}");
         let middle = median(&widths).unwrap();
         assert!(middle < 0.1, "{middle}");
     }
