@@ -2,7 +2,7 @@
 
 use link::isolation::Off;
 use link::session::Counters;
-use link::{AdaptationReport, FaultReport, IsolationReport, Status, Telemetry};
+use link::{AdaptationReport, BrownOut, FaultReport, IsolationReport, Status, Telemetry};
 use model::Limits;
 use model::isolation::Cause;
 use serde::Serialize;
@@ -213,6 +213,8 @@ pub struct StatusReport {
     pub isolation: Option<IsolationRow>,
     /// What the adaptation does; `None` if the MCU's program does not know the request.
     pub adaptation: Option<AdaptationRow>,
+    /// Level of the brown-out reset; `None` if the MCU's program does not know the request, or the board has no such level.
+    pub brown_out: Option<BrownOut>,
     /// Counters of received frames.
     pub link: Counters,
 }
@@ -260,8 +262,13 @@ impl Row {
 }
 
 impl StatusReport {
-    /// Converts a status, what the isolation bank says, and what the adaptation does.
-    pub fn new(status: &Status, isolation: Option<&IsolationReport>, adaptation: Option<&AdaptationReport>) -> Self {
+    /// Converts a status, what the isolation bank says, what the adaptation does, and the level of the brown-out reset.
+    pub fn new(
+        status: &Status,
+        isolation: Option<&IsolationReport>,
+        adaptation: Option<&AdaptationReport>,
+        brown_out: Option<BrownOut>,
+    ) -> Self {
         let firmware = &status.firmware;
         let revision = match firmware.revision {
             0 => String::new(),
@@ -282,6 +289,7 @@ impl StatusReport {
             sample: Row::new(&status.sample, status.rate_hz),
             isolation: isolation.map(|report| IsolationRow::new(report, status.rate_hz)),
             adaptation: adaptation.map(|report| AdaptationRow::new(report, status.rate_hz)),
+            brown_out,
             link: status.counters,
         }
     }
@@ -295,6 +303,13 @@ impl StatusReport {
         let remedy = remedy.unwrap_or_default();
         let isolation = self.isolation.as_ref().map(|row| format!("isolation  {}\n", row.text())).unwrap_or_default();
         let adaptation = self.adaptation.as_ref().map(|row| format!("adaptation {}\n", row.text())).unwrap_or_default();
+        let brown_out =
+            self.brown_out.map_or_else(String::new, |BrownOut { level, expected }| match level == expected {
+                true => format!("brown-out  level {level}\n"),
+                false => format!(
+                    "brown-out  level {level}, expected {expected}: an option of the chip, see docs/bring-up.md\n"
+                ),
+            });
         let limits = if sample.limits.is_empty() { "none".to_owned() } else { sample.limits.join(", ") };
         format!(
             "state      {}, fault {fault}, last reset's {last_fault}\n\
@@ -302,7 +317,7 @@ impl StatusReport {
              applied    {:.3} V, DAC code {}\n\
              stiffness  {:.3} V estimated; measured: {measured}\n\
              limits     {limits}; monitors: {}, sensor: {}\n\
-             {isolation}{adaptation}running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
+             {isolation}{adaptation}{brown_out}running    {:.2} s, tick {} at {rate_hz} Hz, {overruns} overruns\n\
              firmware   {firmware}, controller {controller}, protocol {protocol}, host may be silent for {silence_limit_s} s\n\
              link       {} accepted, {} repeated, {} damaged, {} oversize, {} bad version, {} out of order, {} unknown, \
              {} samples dropped\n",

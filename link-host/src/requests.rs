@@ -5,8 +5,8 @@ use link::block::PART;
 use link::capture::{Capture, Captured, Row};
 use link::isolation::Isolation;
 use link::{
-    AdaptationReport, Block, BlockId, Blocks, IsolationReport, Part, Reason, Reply, Request, Status, WireModel,
-    WireSettings,
+    AdaptationReport, Block, BlockId, Blocks, BrownOut, IsolationReport, Part, Reason, Reply, Request, Status,
+    WireModel, WireSettings,
 };
 
 use crate::client::{Client, status};
@@ -120,6 +120,18 @@ impl Client {
         match self.ask_newer(Request::Adaptation(request))? {
             None => Ok(None),
             Some(Reply::Adaptation(report)) => Ok(Some(report)),
+            Some(other) => Err(Failure::unexpected(other)),
+        }
+    }
+
+    /// Level of the brown-out reset; `None` if the MCU's program does not know the request, or the board has no such level.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub fn brown_out(&mut self) -> Result<Option<BrownOut>, Failure> {
+        match self.ask_newer(Request::BrownOut)? {
+            None => Ok(None),
+            Some(Reply::BrownOut(level)) => Ok(level),
             Some(other) => Err(Failure::unexpected(other)),
         }
     }

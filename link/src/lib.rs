@@ -80,7 +80,7 @@ pub use nonce::{Nonce, Stamp};
 pub use notice::Notice;
 pub use reason::Reason;
 pub use receiver::Receiver;
-pub use reply::{Controller, FaultReport, Reply, Status};
+pub use reply::{BrownOut, Controller, FaultReport, Reply, Status};
 pub use request::Request;
 pub use sequence::Sequence;
 pub use server::{About, Server, Step, Update, View};

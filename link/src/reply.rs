@@ -48,6 +48,17 @@ pub enum Reply {
     Isolation(IsolationReport),
     /// What the adaptation does.
     Adaptation(AdaptationReport),
+    /// The level of the brown-out reset; `None` if the board has no such level.
+    BrownOut(Option<BrownOut>),
+}
+
+/// The level of the supply below which the chip holds itself in reset: an option of the chip, which the firmware does not program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BrownOut {
+    /// Level that is set, as the chip numbers it.
+    pub level: u8,
+    /// Level that is expected.
+    pub expected: u8,
 }
 
 /// Report of a fault that has come since the start.

@@ -89,6 +89,8 @@ pub enum Request {
     Isolation(Isolation),
     /// Reads what the adaptation does, or switches it.
     Adaptation(Adaptation),
+    /// Reads the level of the brown-out reset.
+    BrownOut,
 }
 
 impl Request {

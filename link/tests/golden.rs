@@ -10,8 +10,9 @@ use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, Frame, IsolationReport, Message,
-    Mismatch, Nonce, Notice, Part, Reason, Reply, Request, Sensor, Sequence, State, Status, Telemetry, WireVolts,
+    AdaptationReport, BlockId, Blocks, BrownOut, Controller, Desired, Fault, FaultReport, Field, Frame,
+    IsolationReport, Message, Mismatch, Nonce, Notice, Part, Reason, Reply, Request, Sensor, Sequence, State, Status,
+    Telemetry, WireVolts,
 };
 
 /// Returns the message and its frame as a line of the file for other clients.
@@ -68,6 +69,7 @@ fn requests() {
         (Request::Adaptation(Adaptation::Read), "1300"),
         (Request::Adaptation(Adaptation::Off), "1301"),
         (Request::Adaptation(Adaptation::On), "1302"),
+        (Request::BrownOut, "14"),
     ] {
         frames += &check(&request, b'Q', golden);
     }
@@ -218,6 +220,8 @@ fn replies() {
             "0bf0a20403000000000000f03f0000000000000040000000000000e03f\
              000000000000d03f000000000000c03f000000000000000000000000000010400000000000002040ac02c801",
         ),
+        (Reply::BrownOut(None), "0c00"),
+        (Reply::BrownOut(Some(BrownOut { level: 0, expected: 4 })), "0c010004"),
         (
             Reply::SettingsPart(Part { number: 2, length: 300, bytes: [0xa5; 32] }),
             &format!("0702ac02{}", "a5".repeat(32)),

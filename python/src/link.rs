@@ -63,9 +63,11 @@ impl Connection {
         self.learn()?;
         let name = self.name();
         let isolation = self.client.isolation(Isolation::Read).with_context(|| name.clone())?;
-        let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| name)?;
+        let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| name.clone())?;
+        let brown_out = self.client.brown_out().with_context(|| name)?;
         self.heard = Instant::now();
-        Ok(serde_json::to_string(&StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref()))?)
+        let report = StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref(), brown_out);
+        Ok(serde_json::to_string(&report)?)
     }
 
     /// The models that run and are stored, and what of `plant`, which is sent, the MCU does not run.

@@ -13,7 +13,7 @@ use firmware::control::{Control, Untimed};
 use firmware::host::{self, Host};
 use firmware::isolation::Isolation;
 use firmware::nucleo::uart::Uart;
-use firmware::nucleo::{Nucleo, clocks, random, reset, switch_amplifier_off};
+use firmware::nucleo::{Nucleo, brown_out, clocks, random, reset, switch_amplifier_off};
 use firmware::settings::BUILT_IN;
 use firmware::store::Store;
 use firmware::tasks::{self, Timing};
@@ -65,7 +65,7 @@ fn main() -> ! {
     if seed.is_none() {
         log::refused("random");
     }
-    match host::open(&loaded, &store, &cause, seed.unwrap_or(0)) {
+    match host::open(&loaded, &store, &cause, Some(brown_out::read()), seed.unwrap_or(0)) {
         // Impossible: this is the first call.
         Ok(None) => {}
         Ok(Some((control, isolation, server))) => {

@@ -2,12 +2,12 @@
 //! does not program.
 
 use embassy_stm32::pac::FLASH;
+use link::BrownOut;
 
 /// Expected level: 4, the highest, 2.8 V. As delivered it is 0, 1.7 V.
-pub const EXPECTED: u8 = 4;
+const EXPECTED: u8 = 4;
 
-/// The level if it is not the expected one.
-pub fn unexpected() -> Option<u8> {
-    let level = FLASH.optr().read().bor_lev();
-    (level != EXPECTED).then_some(level)
+/// The level that is set, and the expected one.
+pub fn read() -> BrownOut {
+    BrownOut { level: FLASH.optr().read().bor_lev(), expected: EXPECTED }
 }

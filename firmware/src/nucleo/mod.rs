@@ -68,15 +68,11 @@ impl Nucleo {
         self.watchdog.set(reset_ms);
     }
 
-    /// Compares the processor's clock with the watchdog's, and reads the level of the brown-out reset. A wrong clock is a
-    /// `self-test` fault until the restart, another level is logged only.
+    /// Compares the processor's clock with the watchdog's: a wrong one is a `self-test` fault until the restart.
     pub fn test(&mut self) {
         if let Some(seen_hz) = clock_test::failed() {
             log::self_test("clock", seen_hz);
             self.fault = Some(Fault::SelfTest);
-        }
-        if let Some(level) = brown_out::unexpected() {
-            log::brown_out(level, brown_out::EXPECTED);
         }
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use link::isolation::Off;
-use link::{AdaptationReport, Command, Frame, IsolationReport, Reply, State, Status, Telemetry};
+use link::{AdaptationReport, BrownOut, Command, Frame, IsolationReport, Reply, State, Status, Telemetry};
 use model::adaptation::{Parameters, Phase, Settings};
 use model::isolation::{Cause, Causes, Finding, Verdict};
 use model::{Plant, supervisor};
@@ -79,6 +79,21 @@ fn status_and_isolation_show_what_the_isolation_bank_says_and_its_alarm_is_ackno
     assert_eq!((&isolation["since_s"], &isolation["trip_on_cause"][0]), (&20.096.into(), &"stuck-sensor".into()));
     assert_eq!(json(port, &["isolation", "--acknowledge"])["verdict"], "quiet");
     assert!(good(port, &["status"]).contains("isolation  quiet\n"));
+}
+
+#[test]
+fn status_shows_the_brown_out_level_of_a_board_that_has_one() {
+    let status = |brown_out| {
+        let mcu = Mcu::on_socket(Setup { brown_out, ..Setup::default() });
+        (good(&mcu.port, &["status"]), json(&mcu.port, &["status"])["brown_out"].clone())
+    };
+    let (text, value) = status(None);
+    assert!(!text.contains("brown-out") && value.is_null(), "{text}");
+    let (text, value) = status(Some(BrownOut { level: 4, expected: 4 }));
+    assert!(text.contains("brown-out  level 4\n"), "{text}");
+    assert_eq!((&value["level"], &value["expected"]), (&4.into(), &4.into()));
+    let (text, _) = status(Some(BrownOut { level: 0, expected: 4 }));
+    assert!(text.contains("brown-out  level 0, expected 4: "), "{text}");
 }
 
 /// Read from what the MCU has noted, tick by tick: how fast this machine is decides nothing.

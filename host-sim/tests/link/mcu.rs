@@ -20,8 +20,8 @@ use link::isolation::{Isolation, Off};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    About, AdaptationReport, Block, Command, Controller, Fault, IsolationReport, Notice, Reply, Server, State, Step,
-    Telemetry, View,
+    About, AdaptationReport, Block, BrownOut, Command, Controller, Fault, IsolationReport, Notice, Reply, Server,
+    State, Step, Telemetry, View,
 };
 use model::adaptation::Phase;
 use model::stiffness::{Cantilever, YoungsModulus};
@@ -45,6 +45,8 @@ pub(crate) struct Setup {
     pub(crate) dac_bits: u32,
     /// True if the verdict of the isolation bank comes with the telemetry.
     pub(crate) says_verdict: bool,
+    /// Level of the brown-out reset.
+    pub(crate) brown_out: Option<BrownOut>,
     /// Nothing that the MCU sends arrives any more, see [`Shared::mute`], as soon as this is true of a sample.
     pub(crate) mute_when: fn(&Telemetry) -> bool,
 }
@@ -60,6 +62,7 @@ impl Default for Setup {
             forgets: false,
             dac_bits: 12,
             says_verdict: true,
+            brown_out: None,
             mute_when: |_| false,
         }
     }
@@ -303,6 +306,7 @@ impl Chip {
             last_fault: Fault::NONE,
             model,
             settings: blocks,
+            brown_out: setup.brown_out,
             seed: shared.lock().unwrap().seed,
         };
         let server = Server::new(spring, about);

@@ -29,7 +29,7 @@ use crate::fault::Fault;
 use crate::isolation::Isolation;
 use crate::notice::Notice;
 use crate::reason::Reason;
-use crate::reply::{Firmware, Reply, Status};
+use crate::reply::{BrownOut, Firmware, Reply, Status};
 use crate::request::Request;
 use crate::session::{Action, Counters, Session};
 use crate::telemetry::Telemetry;
@@ -66,6 +66,8 @@ pub struct About {
     pub model: Blocks,
     /// Settings that run, and those that were stored at the start, even if their validation failed.
     pub settings: Blocks,
+    /// Level of the brown-out reset; `None` if the board has no such level.
+    pub brown_out: Option<BrownOut>,
     /// Number from which the nonces of the sessions follow: another one at every start.
     pub seed: u32,
 }
@@ -135,6 +137,7 @@ impl Server {
                 Request::Hello | Request::Status => Reply::Status(self.status(view)),
                 Request::Model => Reply::Model(self.about.model),
                 Request::Settings => Reply::Settings(self.about.settings),
+                Request::BrownOut => Reply::BrownOut(self.about.brown_out),
                 Request::Capture(capture) => return Some(Step::Capture(capture)),
                 Request::Isolation(isolation) => return Some(Step::Isolation(isolation)),
                 Request::Adaptation(adaptation) => return Some(Step::Adaptation(adaptation)),

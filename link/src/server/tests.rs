@@ -23,6 +23,7 @@ const FAULTED: View = view(supervisor::State::Faulted(Cause::Monitor), State::Fa
 const SECOND: View = view(supervisor::State::Faulted(Cause::Watchdog), State::Faulted);
 /// A stored model that failed its validation.
 const REJECTED: BlockId = BlockId { number: 3, format: 1, length: 9, checksum: 7 };
+const BROWN_OUT: Option<BrownOut> = Some(BrownOut { level: 0, expected: 4 });
 const SET: Request = Request::Set(Desired::ScaledVolts(300.0));
 
 const fn view(state: supervisor::State, shown: State) -> View {
@@ -66,6 +67,7 @@ fn server() -> Server {
         silence_limit_ticks: 500,
         rate_hz: 1000,
         model: Blocks { stored: REJECTED, ..Blocks::default() },
+        brown_out: BROWN_OUT,
         seed: 7,
         ..About::default()
     };
@@ -192,8 +194,9 @@ fn models_and_settings_are_accepted_while_disarmed_and_while_a_config_fault_stan
         let done = Reply::Ack { state: State::Faulted, target: WireVolts(7) };
         assert_eq!(answer(View { standing: FAULTED.standing.with(Cause::Config), ..FAULTED }), done, "{request:?}");
     }
+    let answer = |request| exchange(request, &ARMED, &ARMED).1;
     let models = Blocks { active: BlockId::default(), stored: REJECTED };
-    assert_eq!(exchange(Request::Model, &ARMED, &ARMED).1, Reply::Model(models));
+    assert_eq!([answer(Request::Model), answer(Request::BrownOut)], [Reply::Model(models), Reply::BrownOut(BROWN_OUT)]);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use link::isolation::Isolation;
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    AdaptationReport, BlockId, Blocks, Controller, Desired, Fault, FaultReport, Field, IsolationReport, Mismatch,
-    Notice, Part, Reason, Reply, Request, Sensor, State, Status, Telemetry, WireVolts,
+    AdaptationReport, BlockId, Blocks, BrownOut, Controller, Desired, Fault, FaultReport, Field, IsolationReport,
+    Mismatch, Notice, Part, Reason, Reply, Request, Sensor, State, Status, Telemetry, WireVolts,
 };
 use proptest::prelude::*;
 
@@ -50,6 +50,7 @@ pub(crate) fn request() -> impl Strategy<Value = Request> {
         any::<u32>().prop_map(|first| Request::Capture(Capture::Read { first })),
         prop::sample::select(vec![Isolation::Read, Isolation::Acknowledge]).prop_map(Request::Isolation),
         prop::sample::select(vec![Adaptation::Read, Adaptation::Off, Adaptation::On]).prop_map(Request::Adaptation),
+        Just(Request::BrownOut),
     ]
 }
 
@@ -194,6 +195,8 @@ pub(crate) fn reply() -> impl Strategy<Value = Reply> {
                 Reply::Adaptation(AdaptationReport { tick, phase, ratios, bounds, stored, exchanges, exchange_tick })
             }
         ),
+        any::<Option<(u8, u8)>>()
+            .prop_map(|of| Reply::BrownOut(of.map(|(level, expected)| BrownOut { level, expected }))),
         (model(), model()).prop_map(|(active, stored)| Reply::Settings(Blocks { active, stored })),
         any::<(u8, u16, [u8; 32])>().prop_map(|(number, length, bytes)| Reply::SettingsPart(Part {
             number,

@@ -86,7 +86,7 @@ fn main() -> ! {
     if matches!(mode, Mode::Play(Script::UpDown(_))) && !board.amplifier().connect() {
         semihosting::exit(EXIT_NO_SPRING);
     }
-    let (control, isolation, server) = match host::open(&loaded, &store, &cause, semihosting::seed()) {
+    let (control, isolation, server) = match host::open(&loaded, &store, &cause, None, semihosting::seed()) {
         Ok(Some(built)) => built,
         Ok(None) => semihosting::exit(1),
         Err(error) => {

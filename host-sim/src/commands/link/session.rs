@@ -83,11 +83,12 @@ impl Session {
         self.client.isolation(request).with_context(|| self.client.name().to_owned())
     }
 
-    /// The latest status, with what the isolation bank says and what the adaptation does.
+    /// The latest status, with what the isolation bank says, what the adaptation does, and the level of the brown-out reset.
     pub(super) fn report(&mut self) -> Result<StatusReport> {
         let isolation = self.isolation(Isolation::Read)?;
         let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| self.client.name().to_owned())?;
-        Ok(StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref()))
+        let brown_out = self.client.brown_out().with_context(|| self.client.name().to_owned())?;
+        Ok(StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref(), brown_out))
     }
 
     /// Switches the adaptation if the request demands it, and shows what it does.

@@ -20,7 +20,7 @@ struct Entry(&'static str, String, bool);
 
 pub(super) fn draw(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let row = Row::new(&view.sample, view.status.rate_hz);
-    let report = StatusReport::new(&view.status, None, None);
+    let report = StatusReport::new(&view.status, None, None, None);
     let firmware = format!("Firmware {}", report.firmware);
     let all = [
         (VALUES, format!("Now, {} controller", report.controller), values(view, &row)),
