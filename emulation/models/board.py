@@ -3,17 +3,18 @@
 Registers and bits are those that the hardware library uses, as far as the image does; exceptions are ARMv7-M's. Every
 instruction takes one cycle of 170 MHz, a sleeping core skips to the next interrupt; a started clock, a calibration and
 a conversion are ready immediately. The MPU has one region, without access. No flash wait states, no analogue; the core
-itself stays in thread mode.
+itself stays in thread mode. An operation of the flash that a reset interrupts leaves words with two wrong bits.
 """
 
 import random
 import struct
 
 from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
-from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE
+from unicorn import UC_HOOK_BLOCK, UC_HOOK_CODE, UC_HOOK_INTR, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE, UC_HOOK_MEM_WRITE_PROT
+from unicorn import UC_PROT_EXEC, UC_PROT_READ
 from unicorn.arm_const import *
 
-from peripherals import Capture, SysTick, Timer, Uart
+from peripherals import Capture, Flash, SysTick, Timer, Uart
 
 HZ = 170_000_000
 FLASH, RAM, RAM_SIZE = 0x0800_0000, 0x2000_0000, 128 * 1024
@@ -23,13 +24,14 @@ HARD_FAULT = 3
 FRAME = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R12, UC_ARM_REG_LR)
 FLOATS = tuple(UC_ARM_REG_S0 + i for i in range(16))
 
-FLASH_ECCR, FLASH_OPTR = 0x4002_2018, 0x4002_2020
+FLASH_REGS = 0x4002_2000
+FLASH_KEYR, FLASH_SR, FLASH_CR, FLASH_ECCR, FLASH_OPTR = (FLASH_REGS + offset for offset in (0x08, 0x10, 0x14, 0x18, 0x20))
 RNG, VREFINT_CAL = 0x5006_0800, 0x1FFF_75AA
 RCC, IWDG, LPUART1, DAC1, ADC1 = 0x4002_1000, 0x4000_3000, 0x4000_8000, 0x5000_0800, 0x5000_0000
 GPIO = 0x4800_0000
 TIM15, TIM15_IRQ = 0x4001_4000, 24  # Used by the time driver.
 TIM16 = 0x4001_4400
-LPUART1_IRQ = 91
+LPUART1_IRQ, FMAC_IRQ = 91, 101
 SCS = 0xE000_E000
 SYSTICK_IRQ = -1  # Exception 15.
 NMI_IRQ = -14  # Exception 2.
@@ -61,8 +63,10 @@ class Board:
         self.guard, self.entries = None, 0
         uc = self.uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M4)
-        uc.mem_map(FLASH, 512 * 1024)
-        uc.mem_write(FLASH, image)
+        uc.mem_map(FLASH, Flash.SIZE, UC_PROT_READ | UC_PROT_EXEC)
+        uc.mem_write(FLASH, image.ljust(Flash.SIZE, b"\xff"))
+        self.flash = Flash(HZ // 1_000_000, lambda offset, size: bytes(uc.mem_read(FLASH + offset, size)), self._stored)
+        self.torn, self.stale = {}, False
         uc.mem_map(RAM, RAM_SIZE)
         uc.mem_write(RAM, random.Random(1).randbytes(RAM_SIZE))
         uc.mem_map(0x1FFF_7000, 0x1000)
@@ -73,10 +77,13 @@ class Board:
         uc.hook_add(UC_HOOK_BLOCK, self._block)
         uc.hook_add(UC_HOOK_INTR, self._interrupt)
         uc.hook_add(UC_HOOK_MEM_WRITE, self._logged, begin=rtt + 36, end=rtt + 39)
+        uc.hook_add(UC_HOOK_MEM_WRITE_PROT, self._store, begin=FLASH, end=FLASH + Flash.SIZE - 1)
         self.counts = {}
         for at in range(0, len(image) - 1, 2):
             if image[at:at + 2] == b"\x30\xbf":
                 uc.hook_add(UC_HOOK_CODE, self._wfi, begin=FLASH + at, end=FLASH + at)
+            elif image[at:at + 4] == b"\xbf\xf3\x4f\x8f":
+                uc.hook_add(UC_HOOK_CODE, self._dsb, begin=FLASH + at, end=FLASH + at)
 
     # --- Reset and run ---
 
@@ -97,6 +104,7 @@ class Board:
         self.wants_reset = self.sleeping = self.trapped = self.sprung = False
         self.cut = None
         self.fault = None
+        self._interrupt_flash()
         self.note("reset", cause)
         self._look_outside()
         stack, entry = struct.unpack_from("<2I", self.image)
@@ -121,11 +129,20 @@ class Board:
                 self.fault = str(error)
             if self.stopped is not None:
                 self.pc = self.stopped
+                if self.stale:
+                    # Unicorn takes the code after an IT block with a hooked load for a part of that block, and would do so again.
+                    self.stale = False
+                    self.uc.ctl_remove_cache(self.pc, self.pc + 2)
+                    self.uc.reg_write(UC_ARM_REG_XPSR, self.uc.reg_read(UC_ARM_REG_XPSR) & ~0x0600_FC00)
             elif self.pc >= 0xFFFF_FF00:
                 self._exception_return()
             elif self.fault is not None:
                 self._hard_fault(self.fault)
             self._advance()
+            trapped, self.trapped = self.trapped, False
+            if trapped:
+                self.sprung = True
+                self.traps[self.pc](self)
             while self.sleeping and not self._ready() and self.now < min(self.end, self.watchdog or self.end):
                 self.now = self.deadline
                 self._advance()
@@ -136,16 +153,40 @@ class Board:
                 return 1 << 29 | 1 << 26
             if self.cut and self.now >= self.cut[0]:
                 return self.cut[1]
-            if self.trapped:
-                self.trapped, self.sprung = False, True
-                self.traps[self.pc](self)
-            elif self._ready():
+            if trapped:
+                continue
+            if self._ready():
                 self._exception_entry(16 + self.candidate[1], self.candidate[0])
         return None
 
+    def cut_at(self, at, cause):
+        """A reset from outside."""
+        self.cut = at, cause
+        self.end, self.deadline = min(self.end, at), min(self.deadline, at)
+
     def tear(self, at):
-        """From now on a word of the flash has two wrong bits."""
-        self.uc.hook_add(UC_HOOK_MEM_READ, lambda *_: self.two_wrong_bits(), begin=at, end=at + 7)
+        """From now on a double word of the flash has two wrong bits, until it is erased."""
+
+        def read(*_):
+            self.two_wrong_bits()
+            self.stale = True
+
+        if at not in self.torn:
+            self.torn[at] = self.uc.hook_add(UC_HOOK_MEM_READ, read, begin=at, end=at + 7)
+
+    def _interrupt_flash(self):
+        """A reset interrupts the operation of the flash: a double word is half written and torn; of a page some words are erased and the
+        others torn."""
+        if self.flash.running:
+            begin, end, offset, content = self.flash.running
+            if len(content) == 8:
+                self._fill(offset, content[:4])
+                self.tear(FLASH + offset)
+            else:
+                chance, done = random.Random(offset), (self.now - begin) / (end - begin)
+                for at in range(offset, offset + len(content), 8):
+                    self._fill(at, content[:8]) if chance.random() < done else self.tear(FLASH + at)
+        self.flash.reset()
 
     def watch(self, begin, end, what):
         """Notes the first read from `begin` on, before `end`. Unicorn takes an IT block with a hooked load for longer than it is and
@@ -193,6 +234,23 @@ class Board:
 
     # --- Hooks ---
 
+    def _store(self, uc, access, at, size, value, _):
+        """A write of the core to the flash, which by itself changes nothing there."""
+        self.flash.run(self.now)
+        self.flash.store(at - FLASH, size, value & (1 << 8 * size) - 1, self.now)
+        return True
+
+    def _stored(self, offset, content):
+        """The end of an operation of the flash."""
+        self._fill(offset, content)
+        self.note("programmed" if len(content) == 8 else "erased", FLASH + offset)
+
+    def _fill(self, offset, content):
+        for at in range(FLASH + offset, FLASH + offset + len(content), 8):
+            if at in self.torn:
+                self.uc.hook_del(self.torn.pop(at))
+        self.uc.mem_write(FLASH + offset, content)
+
     def _instructions(self, at, size):
         code = self.uc.mem_read(at, size)
         count = i = 0
@@ -206,6 +264,8 @@ class Board:
             self.trapped = True
             return self._stop(at)
         self.sprung = False
+        if self.stale:
+            return self._stop(at)
         if self.now >= self.deadline:
             self._advance()
         # A call is dear here: the self-test of each start passes ten million blocks.
@@ -226,6 +286,11 @@ class Board:
     def _wfi(self, uc, at, size, _):
         self.sleeping = True
         self._stop(at + size)
+
+    def _dsb(self, uc, at, *_):
+        """A barrier ends every read before it, so that what a torn word raises is taken first."""
+        if self.stale:
+            self._stop(at)
 
     def _interrupt(self, uc, number, _):
         self.fault = f"exception {number} of the core"
@@ -316,6 +381,7 @@ class Board:
         """Advances timers and interrupts to `now`."""
         self.timer.run(self.now)
         self.uart.run(self.now)
+        self.flash.run(self.now)
         if self.systick.run(self.now):
             self.pending.add(SYSTICK_IRQ)
         self._settle()
@@ -350,6 +416,13 @@ class Board:
             return value
         if at & ~0x3FF == TIM16:
             return self.capture.get(at - TIM16, self.now)
+        if at in (FLASH_SR, FLASH_CR):
+            self.flash.run(self.now)
+            if self.flash.running and self.candidate is None:
+                # A core that waits for the flash skips to the next interrupt.
+                self.now = max(self.now, min(self.flash.running[1], self.deadline))
+                self.flash.run(self.now)
+            return self.flash.get(at - FLASH_REGS)
         if at == RCC:  # HSI, HSE and PLL are ready as soon as they are enabled.
             return value | (value & 1 << 8) << 2 | (value & (1 << 16 | 1 << 24)) << 1
         if at == RCC + 0x08:
@@ -414,6 +487,9 @@ class Board:
             return self._settle()
         if at & ~0x3FF == TIM16:
             return self.capture.write(at - TIM16, value, self.now)
+        if at in (FLASH_KEYR, FLASH_SR, FLASH_CR):
+            self.flash.run(self.now)
+            return self.flash.set(at - FLASH_REGS, value, self.now)
         if at in (SCS + 0x10, SCS + 0x14, SCS + 0x18):
             self.systick.write(at - SCS, value, self.now)
             return self._settle()

@@ -168,3 +168,81 @@ class Uart:
             self.left_at = self.left_at or now + self.byte_time()
         else:
             self.regs[offset] = value
+
+
+class Flash:
+    """The flash controller with two banks, as delivered: keys, programming of double words, erasing of pages, errors. `read(offset,
+    size)` and `write(offset, bytes)` reach its memory, whose content changes at the end of an operation."""
+
+    PAGE, BANK, SIZE = 0x800, 0x4_0000, 0x8_0000
+    KEYS = [0x4567_0123, 0xCDEF_89AB]
+    PG, PER, BKER, STRT, LOCK = 1, 1 << 1, 1 << 11, 1 << 16, 1 << 31
+    PROGERR, WRPERR, PGAERR, SIZERR, PGSERR, BSY = 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 16
+    PROGRAM_US, ERASE_US = 91, 24_500  # The longest of the data sheet.
+
+    def __init__(self, cycles_per_us, read, write):
+        self.cycles_per_us, self.read, self.write = cycles_per_us, read, write
+        self.protected = None  # Offset of a page that is write-protected.
+        self.begun = lambda number, begin, end: None  # Hears of every operation since the reset.
+        self.reset()
+
+    def reset(self):
+        self.control, self.errors, self.keys = self.LOCK, 0, []
+        self.first = self.running = None
+        self.operations = 0
+
+    def run(self, now):
+        """Ends the operation whose time is over by `now`."""
+        if self.running and now >= self.running[1]:
+            _, _, offset, content = self.running
+            self.running = None
+            self.control &= ~self.STRT
+            self.write(offset, content)
+
+    def get(self, register):
+        return {0x10: self.errors | (self.BSY if self.running else 0), 0x14: self.control}.get(register, 0)
+
+    def set(self, register, value, now):
+        """A write to KEYR, SR or CR."""
+        if register == 0x08:
+            self.keys.append(value)
+            if self.keys == self.KEYS:
+                self.control &= ~self.LOCK
+            elif self.keys != self.KEYS[:len(self.keys)]:
+                raise SystemExit(f"wrong keys of the flash, {self.keys}: it stays locked until the next reset")
+        elif register == 0x10:
+            self.errors &= ~value
+        elif not self.control & self.LOCK:
+            self.control = value & ~self.STRT
+            self.keys = [] if value & self.LOCK else self.keys
+            if value & self.STRT and value & self.PER:
+                page = value >> 3 & 0x7F
+                offset = page * self.PAGE + (self.BANK if value & self.BKER else 0)
+                self._begin(now, self.ERASE_US, offset, b"\xff" * self.PAGE)
+
+    def store(self, offset, size, value, now):
+        """A write of the core to the memory: two words, the lower one first, are a double word."""
+        if self.control & (self.LOCK | self.PG) != self.PG or self.errors or self.running:
+            self.errors |= self.PGSERR
+        elif size != 4:
+            self.errors |= self.SIZERR
+        elif self.first is None and offset % 8 == 0:
+            self.first = offset, value
+        elif self.first is None or offset != self.first[0] + 4:
+            self.errors |= self.PGAERR
+        else:
+            (offset, low), self.first = self.first, None
+            content = low.to_bytes(4, "little") + value.to_bytes(4, "little")
+            if self.read(offset, 8) != b"\xff" * 8 and any(content):
+                self.errors |= self.PROGERR
+            else:
+                self._begin(now, self.PROGRAM_US, offset, content)
+
+    def _begin(self, now, us, offset, content):
+        if self.protected == offset - offset % self.PAGE:
+            self.errors |= self.WRPERR
+            return
+        self.control |= self.STRT if self.control & self.PER else 0
+        self.running = now, now + us * self.cycles_per_us, offset, content
+        self.begun(self.operations, *self.running[:2])
+        self.operations += 1
