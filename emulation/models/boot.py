@@ -1,9 +1,10 @@
-"""Boots an image, injects faults: boot.py IMAGE TICK PANIC RTT MAIN TAKEN STACK VOLTS HOST RECORDED RANDOM STORED prints the events as JSON.
+"""Boots an image, injects faults: boot.py IMAGE CASE prints the events as JSON.
 
-TICK and PANIC are the addresses of the control tick and of `core::panicking::panic`, RTT is the log's, MAIN that of the
-program's first function after start-up, TAKEN that of `cortex_m::peripheral::TAKEN`, STACK the top of the stack. VOLTS is the full scale of its
-amplifier. HOST is what a host sends, as JSON: [time in us, bytes in hex] each, and RECORDED the same of another chip. RANDOM
-is what the random number generator delivers. STORED is a page of settings, in hex.
+CASE is a file with a JSON object. `tick` and `panic` are the addresses of the control tick and of `core::panicking::panic`, `rtt` is
+the log's, `main` that of the program's first function after start-up, `taken` that of `cortex_m::peripheral::TAKEN`, `stack` the top of
+the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each. `random`
+is what the random number generator delivers. `settings` and `model` are stored pages, in hex. `cuts` numbers, for each start, the
+operation of the flash that is cut.
 """
 
 import json
@@ -12,7 +13,7 @@ import sys
 
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_SP
 
-from board import BUTTON, FLASH, HZ, LSI, POWER_ON, RAM, Board
+from board import BUTTON, FLASH, FMAC_IRQ, HZ, LSI, POWER_ON, RAM, Board
 
 FAULT_TICK = 300
 GUARD = 256  # Bytes at the end of the stack.
@@ -53,18 +54,18 @@ def overflowing(board):
 
 def dip(board):
     """The supply dips, for too short a time to clear the memory."""
-    board.cut = board.now, POWER_ON
+    board.cut_at(board.now, POWER_ON)
 
 
 def pressed_armed(board):
     """The reset button is pressed while armed."""
-    board.cut = board.now, BUTTON
+    board.cut_at(board.now, BUTTON)
 
 
 def pressed(board):
     """The reset button is pressed after a fault."""
     opened(board)
-    board.cut = board.now + 20 * HZ // 1000, BUTTON
+    board.cut_at(board.now + 20 * HZ // 1000, BUTTON)
 
 
 def opened(board):
@@ -103,6 +104,30 @@ def deaf(board):
     """Hangs with interrupts disabled."""
     board.uc.reg_write(UC_ARM_REG_PRIMASK, 1)
     broken(HANG)(board)
+
+
+def late(us):
+    """The tick begins in time and takes so long."""
+
+    def inject(board):
+        board.now += us * HZ // 1_000_000
+
+    return inject
+
+
+def idle(board):
+    """The tasks below the control task do not run any more."""
+    board.enabled.discard(FMAC_IRQ)
+
+
+def timeless(board):
+    """The timer of all tasks stops."""
+    board.timer.write(0x00, 0)
+
+
+def halted(board):
+    """The processor executes nothing until something resets it."""
+    board.now = board.watchdog or board.end
 
 
 def taken(board):
@@ -149,21 +174,40 @@ def flipped(board):
 
 def stored(board):
     """Settings are stored."""
-    board.uc.mem_write(STORE[0], STORED)
+    board.uc.mem_write(STORE[0], SETTINGS)
 
 
 def faded(board):
     """A bit of the stored settings is wrong."""
     stored(board)
-    board.uc.mem_write(STORE[0] + 40, bytes([STORED[40] ^ 4]))
+    board.uc.mem_write(STORE[0] + 40, bytes([SETTINGS[40] ^ 4]))
+
+
+def cut(board):
+    """A model is stored, and after each start the chip is reset in the middle of one operation of the flash, as long as there are CUTS."""
+    board.uc.mem_write(STORE[2], MODEL)
+    cuts = list(CUTS)
+
+    def begun(number, begin, end):
+        if cuts and number == cuts[0]:
+            board.note("cut", cuts.pop(0))
+            board.cut_at((begin + end) // 2, BUTTON)
+
+    board.flash.begun = begun
+
+
+def protected(board):
+    """A model is stored, and the page for the next one is write-protected."""
+    board.uc.mem_write(STORE[2], MODEL)
+    board.flash.protected = STORE[3] - FLASH
 
 
 def play(host, fault, until_us, torn=(), before=None, first=None, random_number=None):
-    """Injects `before` before power-on and `first` where the program begins. After the reset the flash is correct again; the
+    """Injects `before` before power-on, `first` where the program begins, `fault` in tick FAULT_TICK. After the reset the flash is correct again; the
     memory keeps its content. Notes the instructions of every tick that no interrupt interrupts, and the stack's depth."""
     board = Board(IMAGE, RTT, host, FULL_SCALE, RANDOM if random_number is None else random_number)
-    for at in torn:
-        board.tear(at)
+    for word in torn:
+        board.tear(word)
     if before:
         before(board)
     board.watch(STORE[0], FLASH + 0x80000, "store read")
@@ -199,10 +243,13 @@ def play(host, fault, until_us, torn=(), before=None, first=None, random_number=
 if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
-    TICK, PANIC, RTT, MAIN, TAKEN, STACK = (int(word, 0) for word in sys.argv[2:8])
-    FULL_SCALE = float(sys.argv[8])
-    HOST, RECORDED = ([(us, bytes.fromhex(frame)) for us, frame in json.loads(arg)] for arg in sys.argv[9:11])
-    RANDOM, STORED = int(sys.argv[11], 0), bytes.fromhex(sys.argv[12])
+    with open(sys.argv[2], encoding="utf-8") as file:
+        CASE = json.load(file)
+    TICK, PANIC, RTT, MAIN, TAKEN, STACK = (CASE[name] for name in ("tick", "panic", "rtt", "main", "taken", "stack"))
+    FULL_SCALE, RANDOM, CUTS = CASE["volts"], CASE["random"], CASE["cuts"]
+    SETTINGS, MODEL = bytes.fromhex(CASE["settings"]), bytes.fromhex(CASE["model"])
+    HOSTS = {name: [(us, bytes.fromhex(frames)) for us, frames in sent] for name, sent in CASE["hosts"].items()}
+    HOST = HOSTS["host"]
     print(json.dumps({
         "quiet": play([], None, 1_200_000),
         "host": play(HOST, stalled, 1_700_000),
@@ -221,7 +268,7 @@ if __name__ == "__main__":
         "other amplifier": play(HOST, mistaken, 480_000) if FULL_SCALE < 1000 else None,
         "supply of 3.6 V": play(HOST, oversupplied, 480_000),
         "current": play(HOST, arcing, 480_000),
-        "replayed": play(RECORDED, None, 1_000_000),
+        "replayed": play(HOSTS["recorded"], None, 1_000_000),
         "no random number": play(HOST, None, 200_000, random_number=0),
         "hang": play(HOST, broken(HANG), 500_000),
         "deaf": play(HOST, deaf, 500_000),
@@ -231,6 +278,15 @@ if __name__ == "__main__":
         "coupled bits": play(HOST, None, 400_000, before=coupled),
         "slow processor": play(HOST, None, 400_000, before=slow),
         "no low-speed clock": play(HOST, None, 400_000, before=silent),
-        "brown-out level": play([], None, 100_000, before=delivered),
+        "brown-out level": play(HOSTS["level"], None, 100_000, before=delivered),
         "voltage at the start": play(HOST, None, 1_200_000, before=charged),
+        "late tick": play(HOST, late(6_400), 440_000),
+        "overrun": play(HOST, late(7_400), 480_000),
+        "stalled tasks": play(HOST, idle, 600_000),
+        "stopped timer": play(HOST, timeless, 400_000),
+        "halted": play(HOST, halted, 500_000),
+        "flood": play(HOSTS["flood"], opened, 440_000),
+        "sent": play(HOSTS["sent"], None, HOSTS["sent"][-1][0] + 100_000),
+        "cut": play(HOSTS["cut"], None, HOSTS["cut"][-1][0] + 100_000, before=cut),
+        "protected page": play(HOSTS["protected"], None, HOSTS["protected"][-1][0] + 100_000, before=protected),
     }))

@@ -181,9 +181,11 @@ fn drill(fault: Fault) -> &'static str {
     match fault {
         Fault::Panic => "drill `panic`, boot `panic`",
         Fault::HardFault => "drill `hard-fault`, drill `stack-overflow`, boot `two wrong bits`",
-        Fault::Overrun => "drill `overrun`",
+        Fault::Overrun => "drill `overrun`, boot `overrun`",
         Fault::Interlock => "drill `interlock`, boot `interlock`",
-        Fault::Watchdog => "drill `hang`, drill `deaf`, drill `stall`, boot `hang`, boot `deaf`",
+        Fault::Watchdog => {
+            "drill `hang`, drill `deaf`, drill `stall`, boot `hang`, boot `deaf`, boot `stalled tasks`, boot `stopped timer`, boot `halted`"
+        }
         Fault::Monitor => "boot `no voltage`, boot `current`, boot `supply of 3.6 V`",
         Fault::Config => "drill `unguarded`, boot `unguarded`, boot `damaged settings`",
         Fault::Supply => "boot `dip`, boot `button while armed`",

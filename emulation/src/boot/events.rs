@@ -34,6 +34,11 @@ impl Events {
         Ok((Self(self.0[..at].to_vec()), Self(self.0[at..].to_vec())))
     }
 
+    /// The events of each start, from its reset on.
+    pub(super) fn starts(&self) -> Vec<Self> {
+        self.0.chunk_by(|_, next| next.1 != "reset").map(|start| Self(start.to_vec())).collect()
+    }
+
     /// An error unless every DAC code is zero and the amplifier is never enabled.
     pub(super) fn safe(&self) -> Result<()> {
         match self.0.iter().find(|event| event.drives()) {

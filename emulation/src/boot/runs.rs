@@ -1,9 +1,9 @@
 //! What each run without a host, or with a fault, must show. Every check returns a line for the report, or an error.
 
 use anyhow::{Context, Result, ensure};
-use firmware::settings::{SUPERVISION, WATCHDOG_MS};
+use firmware::settings::{LONGEST_STALL_MS, SUPERVISION, WATCHDOG_MS};
 use link::frame::MAX_FRAME;
-use link::{FaultReport, Reason, Reply};
+use link::{BrownOut, FaultReport, Reason, Reply};
 use model::Amplifier;
 use model::supervisor::{Fault, Mismatch};
 use serde::Deserialize;
@@ -11,6 +11,7 @@ use xtask::variant::Variant;
 
 use super::events::{Event, Events};
 use super::host;
+use super::schedule::STORED_RESET_MS;
 use crate::variant;
 
 /// Period of the control tick, in us.
@@ -20,11 +21,12 @@ pub(super) const PERIOD_US: f64 = 1000.0;
 pub(super) const JITTER_US: f64 = 20.0;
 /// Timeout of the watchdog, in us.
 const WATCHDOG_US: f64 = WATCHDOG_MS as f64 * 1000.0;
+/// Longest time from the last check-in of a task until the output is off, and the round in which it has still checked in, in us.
+const STALL_US: f64 = (LONGEST_STALL_MS + 15) as f64 * 1000.0;
 /// Longest time that the amplifier's monitors may disagree with the command, plus the tick that detects it, in us.
 pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
-/// Longest time from a fault until its report begins to leave, in us: the longest frame may be on the line, and the
-/// server looks once per tick.
-const FRAME_US: f64 = MAX_FRAME as f64 * 1e7 / 115_200.0 + 2.0 * PERIOD_US;
+/// Duration of the longest frame on the line, in us.
+const FRAME_US: f64 = MAX_FRAME as f64 * 1e7 / 115_200.0;
 /// Longest time from a panic or fault to zero volts, in us. An instruction takes 1/170 us.
 pub(super) const KILL_US: f64 = 5.0;
 
@@ -52,10 +54,7 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     ensure!(!ticking.times("store read").is_empty(), "the store is read before the watchdog is started, or never");
     let ticks = ticking.times("dac");
     ensure!(ticks.len() > 1180, "{} ticks in 1.2 s", ticks.len());
-    // The lateness of each tick on a grid from the first one on, so that drift and missing ticks show.
-    let late: Vec<f64> =
-        ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US).collect();
-    let jitter = late.iter().copied().fold(0.0, f64::max) - late.iter().copied().fold(0.0, f64::min);
+    let jitter = jitter(&ticks);
     ensure!(jitter < JITTER_US, "writes to the DAC are up to {jitter:.2} us off their grid of {PERIOD_US} us");
     ensure!(setup.0.iter().any(|Event(_, what, value)| what == "enable" && value == "off"), "the enable floats");
     let outputs: Vec<&Event> = setup.0.iter().filter(|event| event.1 == "output").collect();
@@ -73,13 +72,20 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     ))
 }
 
+/// Difference between the latest and the earliest of `ticks` on a grid from the first one on, so that drift and missing ticks show.
+pub(super) fn jitter(ticks: &[f64]) -> f64 {
+    let late = ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US);
+    let (earliest, latest) = late.fold((0.0, 0.0), |(least, most): (f64, f64), late| (least.min(late), most.max(late)));
+    latest - earliest
+}
+
 /// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of
 /// the log, then a reset follows that logs its cause and keeps the output safe.
 pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
     let (_, after) = injected(events)?;
     let (dying, restarted) = after.split("reset")?;
     let (silent, _) = dying.split("log")?;
-    let gone = gone(&silent)?;
+    let (gone, _) = let_go(&silent)?;
     ensure!(gone <= within_us, "the voltage goes after {gone:.2} us");
     let log = dying.log(image)?;
     ensure!(log.iter().any(|said| said.contains(line)), "no `{line}` in {log:?}");
@@ -88,20 +94,25 @@ pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str)
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
 
-/// A run with a fault that the supervisor detects, by a `mismatch` of the monitors or by the interlock: the output is
+/// A run with a `fault` that the supervisor detects, of the monitors by this `mismatch`: the output is
 /// zero and disabled within `within_us`, the ticks go on without voltage whatever the host sends, and the fault is
-/// reported on the line, again and again, because this host does not say that it has heard of it.
-pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: Option<Mismatch>) -> Result<String> {
+/// reported on the line, after at most so many `frames`, again and again, because this host does not say that it has heard of it.
+pub(super) fn faulted(
+    events: &Events,
+    image: &[u8],
+    within_us: f64,
+    fault: Fault,
+    mismatch: Option<Mismatch>,
+    frames: u32,
+) -> Result<String> {
     let (_, after) = injected(events)?;
-    let last = after.0.iter().rposition(Event::drives).context("the voltage had gone before")?;
-    let without = Events(after.0[last + 1..].to_vec());
-    let us = gone(&without)? + without.0[0].0 - after.0[0].0;
+    let (us, without) = let_go(&after)?;
     ensure!(us <= within_us, "the voltage goes after {us:.0} us");
     ensure!(without.times("dac").len() > 50 && without.times("reset").is_empty(), "it does not go on");
     let log = after.log(image)?;
-    let (fault, said) = match mismatch {
-        None => (Fault::Interlock, "name=interlock".to_owned()),
-        Some(mismatch) => (Fault::Monitor, format!("monitor {}", mismatch.name())),
+    let said = match mismatch {
+        None => format!("name={}", fault.name()),
+        Some(mismatch) => format!("monitor {}", mismatch.name()),
     };
     let line = log.iter().find(|line| line.contains(&said)).with_context(|| format!("no `{said}` in {log:?}"))?;
 
@@ -116,7 +127,11 @@ pub(super) fn faulted(events: &Events, image: &[u8], within_us: f64, mismatch: O
     ensure!((first.number, first.fault, first.mismatch) == expected, "reported as {first:?}");
     ensure!(reports.iter().all(|(_, report)| *report == first), "the reports differ: {reports:?}");
     let late_us = first_us - (after.0[0].0 + us);
-    ensure!(late_us <= FRAME_US, "reported {late_us:.0} us after the voltage has gone");
+    // The server looks once per tick.
+    ensure!(
+        late_us <= f64::from(frames) * FRAME_US + 2.0 * PERIOD_US,
+        "reported {late_us:.0} us after the voltage has gone"
+    );
     let between = reports.windows(2).map(|pair| pair[1].0 - pair[0].0).fold(0.0, f64::max);
     ensure!(between < 110_000.0, "{between:.0} us between two reports");
     Ok(format!(
@@ -140,13 +155,13 @@ pub(super) fn stored(events: &Events, image: &[u8]) -> Result<String> {
         !log.iter().any(|line| line.contains("refused") || line.contains("fault code")),
         "they are refused: {log:?}"
     );
-    let expected_us = u64::from(host::STORED_RESET_MS) * 1000;
+    let expected_us = u64::from(STORED_RESET_MS) * 1000;
     let mut fed = events.0.iter().filter(|event| event.1 == "fed").map(|event| &event.2).peekable();
     ensure!(fed.peek().is_some(), "the watchdog is not fed");
     let other = fed.find(|time| time.as_u64() != Some(expected_us));
     ensure!(other.is_none(), "a watchdog of {other:?} us, {expected_us} us in the settings");
     ensure!(events.times("reset").len() == 1, "it was reset");
-    Ok(format!("they run: the watchdog, started with {WATCHDOG_MS} ms, has {} ms", host::STORED_RESET_MS))
+    Ok(format!("they run: the watchdog, started with {WATCHDOG_MS} ms, has {STORED_RESET_MS} ms"))
 }
 
 /// A start with stored settings of which a bit is wrong: the built-in ones run, nothing is armed, and the host hears why.
@@ -162,6 +177,23 @@ pub(super) fn cut(events: &Events, image: &[u8], cause: &str) -> Result<String> 
     let (_, after) = injected(events)?;
     let (_, restarted) = after.split("reset")?;
     Ok(format!("no voltage until it is acknowledged; `{}`", restarted_safe(&restarted, image, cause)?))
+}
+
+/// A run in which no task but the control task goes on: the output is zero and disabled within the time of the task watchdog, and the
+/// chip's watchdog, which is not fed any more, resets the chip.
+pub(super) fn stalled(events: &Events, image: &[u8]) -> Result<String> {
+    let (_, after) = injected(events)?;
+    let (dying, restarted) = after.split("reset")?;
+    let (us, _) = let_go(&dying)?;
+    ensure!(us <= STALL_US, "the voltage goes after {us:.0} us");
+    let reset_us = restarted.0[0].0 - after.0[0].0;
+    ensure!(reset_us <= STALL_US + WATCHDOG_US, "the watchdog waits for {reset_us:.0} us");
+    let boot = restarted_safe(&restarted, image, "reset=watchdog last_fault=5")?;
+    Ok(format!(
+        "DAC zero and enable off {:.1} ms later; the watchdog resets the chip after {:.0} ms; `{boot}`",
+        us / 1e3,
+        reset_us / 1e3
+    ))
 }
 
 /// A run that hangs with interrupts disabled: the watchdog resets the chip in time.
@@ -291,13 +323,16 @@ fn not_armed(events: &Events, image: &[u8], line: &str, fault: Fault) -> Result<
     Ok(())
 }
 
-/// A start with the brown-out level of a new chip, which the log says.
+/// A start with the brown-out level of a new chip, which log and link say.
 pub(super) fn delivered(events: &Events, image: &[u8]) -> Result<String> {
     let boot = restarted_safe(events, image, "reset=power-on last_fault=0")?;
     let log = events.log(image)?;
     let line = "brown-out level=0 expected=4";
     ensure!(log.iter().any(|said| said == line), "it does not say so: {log:?}");
-    Ok(format!("`{line}`; `{boot}`"))
+    let answers = answers(events)?;
+    let level = Some(BrownOut { level: 0, expected: 4 });
+    ensure!(answers.contains(&Reply::BrownOut(level)), "the host does not hear of it: {answers:?}");
+    Ok(format!("`{line}`, which the host hears as well; `{boot}`"))
 }
 
 /// A start with a voltage at the monitor although the amplifier is off: arming is refused, and after the discharge time
@@ -323,6 +358,14 @@ fn injected(events: &Events) -> Result<(Events, Events)> {
     let (before, after) = events.split("injected")?;
     ensure!(before.safe().is_err(), "no voltage before the injected fault, so that it shows nothing");
     Ok((before, after))
+}
+
+/// The time from the first event until the voltage is gone for good, in us, and the events from then on. A tick that had begun before
+/// may still write once.
+fn let_go(events: &Events) -> Result<(f64, Events)> {
+    let after_last = events.0.iter().rposition(Event::drives).map_or(0, |last| last + 1);
+    let without = Events(events.0[after_last..].to_vec());
+    Ok((gone(&without)? + without.0[0].0 - events.0[0].0, without))
 }
 
 /// The time from the first event until the output was both zero and disabled, in us.
