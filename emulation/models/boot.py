@@ -4,7 +4,7 @@ CASE is a file with a JSON object. `tick` and `panic` are the addresses of the c
 the log's, `main` that of the program's first function after start-up, `taken` that of `cortex_m::peripheral::TAKEN`, `stack` the top of
 the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each. `random`
 is what the random number generator delivers. `settings` and `model` are stored pages, in hex. `cuts` numbers, for each start, the
-operation of the flash that is cut.
+operation of the flash that is cut. `runs` names the runs that are wanted.
 """
 
 import json
@@ -250,43 +250,44 @@ if __name__ == "__main__":
     SETTINGS, MODEL = bytes.fromhex(CASE["settings"]), bytes.fromhex(CASE["model"])
     HOSTS = {name: [(us, bytes.fromhex(frames)) for us, frames in sent] for name, sent in CASE["hosts"].items()}
     HOST = HOSTS["host"]
-    print(json.dumps({
-        "quiet": play([], None, 1_200_000),
-        "host": play(HOST, stalled, 1_700_000),
-        "panic": play(HOST, panic, 400_000),
-        "hard fault": play(HOST, broken(UNDEFINED), 400_000),
-        "two wrong bits": play(HOST, rotten, 400_000),
-        "stack overflow": play(HOST, overflowing, 400_000),
-        "torn": play([], None, 200_000, STORE),
-        "stored settings": play(HOST, None, 200_000, before=stored),
-        "damaged settings": play(HOST, None, 400_000, before=faded),
-        "dip": play(HOST, dip, 400_000),
-        "button": play(HOST, pressed, 400_000),
-        "button while armed": play(HOST, pressed_armed, 400_000),
-        "interlock": play(HOST, opened, 480_000),
-        "no voltage": play(HOST, shorted, 480_000),
-        "other amplifier": play(HOST, mistaken, 480_000) if FULL_SCALE < 1000 else None,
-        "supply of 3.6 V": play(HOST, oversupplied, 480_000),
-        "current": play(HOST, arcing, 480_000),
-        "replayed": play(HOSTS["recorded"], None, 1_000_000),
-        "no random number": play(HOST, None, 200_000, random_number=0),
-        "hang": play(HOST, broken(HANG), 500_000),
-        "deaf": play(HOST, deaf, 500_000),
-        "unguarded": play(HOST, None, 400_000, first=taken),
-        "wrong image": play(HOST, None, 400_000, first=flipped),
-        "stuck bit": play(HOST, None, 400_000, before=stuck),
-        "coupled bits": play(HOST, None, 400_000, before=coupled),
-        "slow processor": play(HOST, None, 400_000, before=slow),
-        "no low-speed clock": play(HOST, None, 400_000, before=silent),
-        "brown-out level": play(HOSTS["level"], None, 100_000, before=delivered),
-        "voltage at the start": play(HOST, None, 1_200_000, before=charged),
-        "late tick": play(HOST, late(6_400), 440_000),
-        "overrun": play(HOST, late(7_400), 480_000),
-        "stalled tasks": play(HOST, idle, 600_000),
-        "stopped timer": play(HOST, timeless, 400_000),
-        "halted": play(HOST, halted, 500_000),
-        "flood": play(HOSTS["flood"], opened, 440_000),
-        "sent": play(HOSTS["sent"], None, HOSTS["sent"][-1][0] + 100_000),
-        "cut": play(HOSTS["cut"], None, HOSTS["cut"][-1][0] + 100_000, before=cut),
-        "protected page": play(HOSTS["protected"], None, HOSTS["protected"][-1][0] + 100_000, before=protected),
-    }))
+    RUNS = {
+        "quiet": lambda: play([], None, 1_200_000),
+        "host": lambda: play(HOST, stalled, 1_700_000),
+        "panic": lambda: play(HOST, panic, 400_000),
+        "hard fault": lambda: play(HOST, broken(UNDEFINED), 400_000),
+        "two wrong bits": lambda: play(HOST, rotten, 400_000),
+        "stack overflow": lambda: play(HOST, overflowing, 400_000),
+        "torn": lambda: play([], None, 200_000, STORE),
+        "stored settings": lambda: play(HOST, None, 200_000, before=stored),
+        "damaged settings": lambda: play(HOST, None, 400_000, before=faded),
+        "dip": lambda: play(HOST, dip, 400_000),
+        "button": lambda: play(HOST, pressed, 400_000),
+        "button while armed": lambda: play(HOST, pressed_armed, 400_000),
+        "interlock": lambda: play(HOST, opened, 480_000),
+        "no voltage": lambda: play(HOST, shorted, 480_000),
+        "other amplifier": lambda: play(HOST, mistaken, 480_000),
+        "supply of 3.6 V": lambda: play(HOST, oversupplied, 480_000),
+        "current": lambda: play(HOST, arcing, 480_000),
+        "replayed": lambda: play(HOSTS["recorded"], None, 1_000_000),
+        "no random number": lambda: play(HOST, None, 200_000, random_number=0),
+        "hang": lambda: play(HOST, broken(HANG), 500_000),
+        "deaf": lambda: play(HOST, deaf, 500_000),
+        "unguarded": lambda: play(HOST, None, 400_000, first=taken),
+        "wrong image": lambda: play(HOST, None, 400_000, first=flipped),
+        "stuck bit": lambda: play(HOST, None, 400_000, before=stuck),
+        "coupled bits": lambda: play(HOST, None, 400_000, before=coupled),
+        "slow processor": lambda: play(HOST, None, 400_000, before=slow),
+        "no low-speed clock": lambda: play(HOST, None, 400_000, before=silent),
+        "brown-out level": lambda: play(HOSTS["level"], None, 100_000, before=delivered),
+        "voltage at the start": lambda: play(HOST, None, 1_200_000, before=charged),
+        "late tick": lambda: play(HOST, late(6_400), 440_000),
+        "overrun": lambda: play(HOST, late(7_400), 480_000),
+        "stalled tasks": lambda: play(HOST, idle, 600_000),
+        "stopped timer": lambda: play(HOST, timeless, 400_000),
+        "halted": lambda: play(HOST, halted, 500_000),
+        "flood": lambda: play(HOSTS["flood"], opened, 440_000),
+        "sent": lambda: play(HOSTS["sent"], None, HOSTS["sent"][-1][0] + 100_000),
+        "cut": lambda: play(HOSTS["cut"], None, HOSTS["cut"][-1][0] + 100_000, before=cut),
+        "protected page": lambda: play(HOSTS["protected"], None, HOSTS["protected"][-1][0] + 100_000, before=protected),
+    }
+    print(json.dumps({name: RUNS[name]() for name in CASE["runs"]}))

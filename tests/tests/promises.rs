@@ -70,8 +70,8 @@ fn fault_of(evidence: &str) -> Option<String> {
     }
     if let Some(name) = evidence.strip_prefix("boot ") {
         let name = name.trim_matches('`');
-        let played = read("emulation/models/boot.py").contains(&format!("\"{name}\": play("));
-        let checked = read("emulation/src/boot/mod.rs").contains(&format!("\"{name}\""));
+        let played = read("emulation/models/boot.py").contains(&format!("\"{name}\": lambda: play("));
+        let checked = read("emulation/src/boot/checks.rs").contains(&format!("\"{name}\""));
         return (!played || !checked).then(|| format!("no boot run {name}"));
     }
     if let Some((_, file)) = COMMANDS.into_iter().find(|(name, _)| *name == evidence) {
@@ -108,7 +108,7 @@ fn every_drill_and_every_boot_run_breaks_a_promise() {
         assert!(page.contains(&format!("drill `{name}`")), "drill {name}");
     }
     let boot = read("emulation/models/boot.py");
-    let runs = boot.lines().filter_map(|line| line.trim_start().strip_prefix('"')?.split_once("\": play("));
+    let runs = boot.lines().filter_map(|line| line.trim_start().strip_prefix('"')?.split_once("\": lambda: play("));
     for (name, _) in runs {
         assert!(page.contains(&format!("boot `{name}`")), "boot run {name}");
     }

@@ -16,7 +16,7 @@ const FIRST: &[Step] = &[Step::new("format", &["fmt", "--all", "--check"])];
 /// other features and be built again. Without a board the firmware's library is an ordinary one.
 ///
 /// Each image is linted for its board alone, with and without the optional features, because an image with a feature hides what is left
-/// out without it. Of the six images `boot` runs the first and one that differs from it in everything.
+/// out without it. Of the six images `boot` runs the first and, where that matters, one that differs from it in everything.
 const LANES: Lanes = Lanes {
     build: Step::new("build", &["build", "--quiet", "--workspace", "--lib", "--bins", "--tests", "--examples"]),
     // The longest step by far, and on one core most of the time: it begins as soon as it can.
@@ -58,7 +58,7 @@ const LANES: Lanes = Lanes {
         // Of the images with 16 KB of RAM the one that needs most.
         Step::emulation("size", &["size", "--feedback", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("boot", &["boot"]),
-        Step::emulation("boot both", &["boot", "--controller", "fast", "--limit-v", "1000"]),
+        Step::emulation("boot both", &["boot", "--brief", "--controller", "fast", "--limit-v", "1000"]),
         Step::emulation("clients", &["clients"]),
         Step::emulation("c library", &["capi"]),
     ],

@@ -64,7 +64,7 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     let longest = fed.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     ensure!(longest < WATCHDOG_US / 2.0, "{longest:.0} us without food for the watchdog");
     Ok(format!(
-        "boot: {} ticks, DAC zero and enable off throughout, written every 1000 us, {jitter:.2} us of jitter; \
+        "{} ticks, DAC zero and enable off throughout, written every 1000 us, {jitter:.2} us of jitter; \
          watchdog of {:.0} ms started, fed at least every {:.1} ms",
         ticks.len(),
         WATCHDOG_US / 1e3,
