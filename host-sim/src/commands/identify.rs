@@ -30,7 +30,7 @@ Examples:
   vsj identify hv.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
   vsj identify record.csv --out out/nominal        with a page and plant.toml
   vsj diagnose record.csv --plant out/nominal/plant.toml
-  vsj bound --plant out/nominal/plant.toml --identified out/nominal/identify.json      how fast a step can be
+  vsj bound --plant out/nominal/plant.toml --identified out/nominal/identify.json
   vsj identify record.csv --json | jq .nominal")]
 pub(crate) struct Arguments {
     #[command(flatten)]
