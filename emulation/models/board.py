@@ -92,7 +92,8 @@ class Board:
         # Two banks of flash, as the chip is delivered: FLASH_OPTR.DBANK.
         options = 1 << 22 | self.brown_out << 8
         self.regs = {RCC + 0x94: cause, GPIO: 0xABFF_FFFF, GPIO + 0x400: 0xFFFF_FEBF, FLASH_OPTR: options}
-        self.capture = Capture(self.lsi and HZ / self.lsi, lambda: self.regs.get(RCC + 0x94, 0) & 1 and self.regs.get(RCC + 0x60, 0) >> 17 & 1)
+        is_clocked = lambda: self.regs.get(RCC + 0x94, 0) & 1 and self.regs.get(RCC + 0x60, 0) >> 17 & 1
+        self.capture = Capture(self.lsi and HZ / self.lsi, is_clocked)
         self.timer = Timer()
         self.timer.at = self.now
         self.systick = SysTick()

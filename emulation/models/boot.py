@@ -107,7 +107,7 @@ def deaf(board):
 
 
 def late(us):
-    """The tick begins in time and takes so long."""
+    """The tick begins in time and takes `us` microseconds longer, as one jump: the hang guard, which would count them, counts once."""
 
     def inject(board):
         board.now += us * HZ // 1_000_000
@@ -203,8 +203,8 @@ def protected(board):
 
 
 def play(host, fault, until_us, torn=(), before=None, first=None, random_number=None):
-    """Injects `before` before power-on, `first` where the program begins, `fault` in tick FAULT_TICK. After the reset the flash is correct again; the
-    memory keeps its content. Notes the instructions of every tick that no interrupt interrupts, and the stack's depth."""
+    """Injects `before` before power-on, `first` where the program begins, `fault` in tick FAULT_TICK. After the reset the flash is correct
+    again; the memory keeps its content. Notes the instructions of every tick that no interrupt interrupts, and the stack's depth."""
     board = Board(IMAGE, RTT, host, FULL_SCALE, RANDOM if random_number is None else random_number)
     for word in torn:
         board.tear(word)

@@ -116,15 +116,16 @@ Examples:
     ///
     /// Checks that it fits and that its tick cannot panic. Runs boot and 1.2 s without a host; a host that arms it over
     /// LPUART1 and sets targets, where every code must be the host model's for this controller and amplifier, and many
-    /// must differ from any other image's; then a panic, a hard fault and two hangs while voltage is out. Exits with 1
-    /// unless the output is as it must be each time; says what this cannot show. Installs Unicorn into a venv under the
-    /// target directory.
+    /// must differ from any other image's; one that stores settings and a model, also with resets in the middle, and one that floods
+    /// the line; then faults while voltage is out, from a panic to a stopped processor. Exits with 1 unless the output is as it must be
+    /// each time; says what this cannot show. Installs Unicorn into a venv under the target directory.
     #[command(after_help = "\
 Examples:
   cargo xtask boot
   cargo xtask boot --controller fast                   the image of the time-optimal controller
   cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V
   cargo xtask boot --controller robust                 for a spring known to within errors
+  cargo xtask boot --brief --controller fast           only what the controller or the amplifier may change
   cargo xtask boot --all                               every image, one after the other")]
     Boot(boot::Args),
     /// Build the C library's example, run it here and under QEMU

@@ -55,9 +55,9 @@ pub enum Reply {
 /// The level of the supply below which the chip holds itself in reset: an option of the chip, which the firmware does not program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BrownOut {
-    /// Level that is set, as the chip numbers it.
+    /// Level that is set, 0 to 4 as the chip numbers it.
     pub level: u8,
-    /// Level that is expected.
+    /// Level that is expected, 0 to 4.
     pub expected: u8,
 }
 

@@ -25,7 +25,7 @@ const RATES_HZ: (u32, u32) = (100, 2000);
 const TIMER_HZ: u32 = 1_000_000;
 /// Longest round of the task watchdog, in ms: tasks check in every 10 ms, or after waiting for the line for up to 20 ms, or for a page of
 /// flash to be erased, 25 ms.
-const LONGEST_ROUND_MS: u32 = 45;
+pub const LONGEST_ROUND_MS: u32 = 45;
 /// Largest tolerance of the voltage monitor, as a part of the amplifier's full scale.
 const MOST_TOLERANCE: f64 = 0.1;
 /// Largest tolerated current, in A, below the end of the monitor's range of 5 mA: beyond, none would be seen.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use firmware::LONGEST_HANG_MS;
 use firmware::settings::{LONGEST_STALL_MS, SUPERVISION, WATCHDOG_MS};
 use link::{Field, Reason};
+use model::device::LONGEST_ROUND_MS;
 use model::supervisor::{Command, Fault, Faults, Inputs, Monitors, State, Supervisor};
 use model::units::SampleTime;
 use model::{Config, Input, Settings, Volts};
@@ -165,8 +166,8 @@ fn within(fault: Fault) -> String {
         Fault::Interlock => "1 ms".into(),
         Fault::Watchdog => format!(
             "control task {LONGEST_HANG_MS} ms, any other {} ms, interrupts off {WATCHDOG_MS} ms",
-            // The round in which the task has still checked in.
-            LONGEST_STALL_MS + 15
+            // The round in which the task has still checked in, and two ticks.
+            LONGEST_STALL_MS + LONGEST_ROUND_MS + 2
         ),
         Fault::Monitor => format!("{driven} ms, {off} ms while the output is off"),
         Fault::Config => "nothing was enabled".into(),

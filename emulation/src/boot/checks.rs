@@ -6,8 +6,8 @@ use firmware::settings::SUPERVISION;
 use model::supervisor::{Fault, Mismatch};
 use xtask::variant::{Limit, Variant};
 
-use super::events::Events;
-use super::runs::{JITTER_US, KILL_US, MONITOR_US, PERIOD_US};
+use super::events::{Events, JITTER_US, PERIOD_US};
+use super::runs::{KILL_US, MONITOR_US};
 use super::{host, runs};
 
 /// Returns a line for the report, or an error that says what a run does not show.
@@ -17,21 +17,30 @@ type Shows<'a> = Box<dyn Fn(&Events) -> Result<String> + 'a>;
 pub(super) struct Check<'a> {
     /// Name of the run.
     pub(super) run: &'static str,
+    /// Number of faults that are injected in the run.
+    pub(super) faults: usize,
+    /// True if the run depends on controller or amplifier more than on the rest of the image.
+    pub(super) is_of_variant: bool,
     /// What it has to show.
     pub(super) shows: Shows<'a>,
 }
 
 impl Check<'_> {
-    /// True if the run depends on controller or amplifier; what the others show of one image is true of each.
-    pub(super) fn is_of_variant(&self) -> bool {
-        ["quiet", "host", "sent", "interlock", "hang", "no voltage", "other amplifier"].contains(&self.run)
+    /// The same check of a run with another number of faults.
+    fn with_faults(self, faults: usize) -> Self {
+        Self { faults, ..self }
+    }
+
+    /// The same check of a run that depends on controller or amplifier.
+    fn of_variant(self) -> Self {
+        Self { is_of_variant: true, ..self }
     }
 }
 
 /// The checks of an image. `cuts` numbers the operations of the flash in which the chip is reset.
 pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Vec<Check<'a>> {
     fn check<'a>(run: &'static str, shows: impl Fn(&Events) -> Result<String> + 'a) -> Check<'a> {
-        Check { run, shows: Box::new(shows) }
+        Check { run, faults: 1, is_of_variant: false, shows: Box::new(shows) }
     }
     let hang_us = f64::from(LONGEST_HANG_MS) * 1e3;
     let stopped = |run, within_us, log| check(run, move |it| runs::stopped(it, image, within_us, log));
@@ -44,27 +53,30 @@ pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Ve
     let clock = |run, seen_hz| check(run, move |it| runs::wrong_clock(it, image, seen_hz));
     let refused = |run, field| check(run, move |it| runs::refused(it, image, field));
     let mut checks = vec![
-        check("quiet", move |it| runs::quiet(it, image, variant)),
-        check("host", move |it| host::check(it, variant)),
-        check("host", move |it| runs::instructions(it, variant)),
+        check("quiet", move |it| runs::quiet(it, image, variant)).with_faults(0).of_variant(),
+        check("host", move |it| Ok(host::check(it, variant)? + "; " + &runs::instructions(it, variant)?))
+            .with_faults(0)
+            .of_variant(),
         stopped("panic", KILL_US, "panic at injected.rs:7"),
         stopped("hard fault", KILL_US, "name=hard-fault"),
         stopped("two wrong bits", KILL_US, "name=hard-fault"),
         stopped("stack overflow", KILL_US, "name=hard-fault"),
-        stopped("hang", hang_us + KILL_US, "name=watchdog"),
+        stopped("hang", hang_us + KILL_US, "name=watchdog").of_variant(),
         stopped("stopped timer", hang_us + KILL_US, "name=watchdog"),
-        check("flood", move |it| host::flood(it, variant)),
         check("late tick", |it| host::late(it, SUPERVISION.missed_ticks_allowed)),
-        faulted("interlock", in_next_us, Fault::Interlock, None, 1),
+        faulted("interlock", in_next_us, Fault::Interlock, None, 1).of_variant(),
         // The buffer of the line is full, and a frame waits for room in it.
-        faulted("flood", in_next_us, Fault::Interlock, None, 2),
-        // The tick that takes 7.4 ms still ends; the next one on the grid detects it.
+        check("flood", move |it| {
+            let faulted = runs::faulted(it, image, in_next_us, Fault::Interlock, None, 2)?;
+            Ok(host::flood(it, variant)? + "; " + &faulted)
+        }),
+        // The tick that takes 7.4 ms still ends; the next one, which follows it immediately, detects it.
         faulted("overrun", 8.0 * PERIOD_US + JITTER_US, Fault::Overrun, None, 1),
-        monitor("no voltage", Mismatch::Open),
+        monitor("no voltage", Mismatch::Open).of_variant(),
         monitor("current", Mismatch::Leakage),
         monitor("supply of 3.6 V", Mismatch::Reference),
         check("torn", move |it| runs::torn(it, image)),
-        check("stored settings", move |it| runs::stored(it, image)),
+        check("stored settings", move |it| runs::stored(it, image)).with_faults(0),
         check("damaged settings", move |it| runs::damaged(it, image)),
         reset("dip", "reset=brown-out last_fault=8"),
         reset("button", "reset=pin last_fault=4"),
@@ -72,8 +84,8 @@ pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Ve
         check("deaf", move |it| runs::deaf(it, image)),
         check("halted", move |it| runs::deaf(it, image)),
         check("stalled tasks", move |it| runs::stalled(it, image)),
-        check("sent", move |it| host::sent(it, variant)),
-        check("cut", move |it| host::cut(it, cuts)),
+        check("sent", move |it| host::sent(it, variant)).with_faults(0).of_variant(),
+        check("cut", move |it| host::cut(it, cuts)).with_faults(cuts.len()),
         check("protected page", host::protected),
         check("replayed", move |it| runs::replayed(it, image)),
         check("no random number", move |it| runs::unrandom(it, image)),
@@ -88,7 +100,7 @@ pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Ve
     ];
     // An amplifier below the image's limit is no danger.
     if variant.limit_v != Limit::Kilovolt {
-        checks.push(monitor("other amplifier", Mismatch::Reference));
+        checks.push(monitor("other amplifier", Mismatch::Reference).of_variant());
     }
     checks
 }

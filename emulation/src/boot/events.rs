@@ -6,6 +6,14 @@ use serde::Deserialize;
 
 use crate::qemu::emulator;
 
+/// Period of the control tick, in us.
+pub(super) const PERIOD_US: f64 = 1000.0;
+/// Largest difference between the earliest and the latest tick relative to their grid, in us: the logger disables
+/// interrupts briefly.
+pub(super) const JITTER_US: f64 = 20.0;
+/// Duration of a byte on the line at 115 200 bit/s, in us.
+pub(super) const BYTE_US: f64 = 1e7 / 115_200.0;
+
 /// An event outside of the core: time in us, name, value.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub(super) struct Event(pub(super) f64, pub(super) String, pub(super) serde_json::Value);
@@ -59,4 +67,12 @@ impl Events {
         let lines = emulator::decode(Formats::parse(image)?, &mut bytes.as_slice(), |_| {})?.whole()?;
         Ok(lines.into_iter().map(|line| line.message).collect())
     }
+}
+
+/// Difference between the latest and the earliest of `ticks` on a grid from the first one on, all in us, so that drift and missing ticks
+/// show.
+pub(super) fn jitter(ticks: &[f64]) -> f64 {
+    let late = ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US);
+    let (earliest, latest) = late.fold((0.0, 0.0), |(least, most): (f64, f64), late| (least.min(late), most.max(late)));
+    latest - earliest
 }

@@ -13,13 +13,9 @@ use link::{
 use model::{Settings, Volts, supervisor};
 use xtask::variant::Variant;
 
-use super::events::{Event, Events};
-use super::runs::{JITTER_US, PERIOD_US, jitter};
+use super::events::{BYTE_US, Event, Events, JITTER_US, PERIOD_US, jitter};
 use super::schedule::{self, EVERY_TICKS, STORED_RESET_MS, Schedule, TARGETS_V};
 use crate::variant;
-
-/// Duration of a byte at 115 200 bit/s, in us.
-const BYTE_US: f64 = 1e7 / 115_200.0;
 
 /// The time at which an answer began to leave, in us, its sequence number and its content.
 type Answer = (f64, Sequence, Reply);
@@ -56,7 +52,8 @@ pub(super) fn check(events: &Events, variant: Variant) -> Result<String> {
     let [first, second] = TARGETS_V;
     Ok(format!(
         "{} requests over LPUART1 armed it, set {first} V and {second} V and fell silent, past a debugger that reads the log \
-         no more: {driven} codes with voltage, all {} of the run as on the host, where at least {telling} of them are others for any other controller or limit",
+         no more: {driven} codes with voltage, all {} of the run as on the host, where at least {telling} of them are others for any other \
+         controller or limit",
         schedule.0.len(),
         written.len()
     ))
@@ -82,6 +79,7 @@ pub(super) fn sent(events: &Events, variant: Variant) -> Result<String> {
     let ticks: Vec<f64> = storing.times("dac").into_iter().take_while(|us| *us < stored_us).collect();
     let late = jitter(&ticks);
     ensure!(late < JITTER_US, "ticks are up to {late:.2} us off their grid of {PERIOD_US} us while pages are erased");
+    ensure!(ticks.last().is_some_and(|us| stored_us - us < 2.0 * PERIOD_US), "no tick at {stored_us:.0} us");
 
     let schedule = schedule::sent(variant)?;
     let restart = schedule.0.iter().position(|(_, request)| *request == Request::Restart).context("no restart")? + 1;
@@ -127,9 +125,9 @@ pub(super) fn sent(events: &Events, variant: Variant) -> Result<String> {
 }
 
 /// A run in which the chip is reset in the middle of operations of the flash, in those of `cuts`, while a model is stored beside another:
-/// the old one or the new one runs, and the next transfer is stored.
+/// the old one runs, or nothing can be armed, and the next transfer is stored.
 pub(super) fn cut(events: &Events, cuts: &[usize]) -> Result<String> {
-    events.safe()?;
+    ensure!(!events.0.iter().any(|event| event.1 == "dac" && event.2 != 0), "a voltage without a target");
     let starts = events.starts();
     ensure!(starts.len() == cuts.len() + 2, "{} starts after {} cuts and a restart", starts.len(), cuts.len());
     ensure!(events.times("cut").len() == cuts.len(), "not every operation is cut");
@@ -145,26 +143,30 @@ pub(super) fn cut(events: &Events, cuts: &[usize]) -> Result<String> {
         let model =
             answers.iter().find_map(|(.., reply)| if let Reply::Model(model) = reply { Some(model) } else { None });
         let active = model.with_context(|| format!("no model after start {start}"))?.active;
-        ensure!(
-            [&old, &new].map(|payload| frame_of(payload)).contains(&(active.length, active.checksum)),
-            "neither the old nor the new model runs after start {start}, but {active:?}"
-        );
+        let runs = if start <= cuts.len() { &old } else { &new };
+        ensure!((active.length, active.checksum) == frame_of(runs), "{active:?} runs after start {start}");
         // In its last word it cannot be known what was stored, and nothing is armed until a model is.
-        if fault != Fault::NONE {
+        let expected = if fault == Fault::NONE {
+            Reply::Ack { state: State::Armed, target: WireVolts::from_f64(0.0) }
+        } else {
             let after_seal = start > 0 && cuts[..start.min(cuts.len())].contains(&seal);
             ensure!(after_seal && fault == Fault::from(supervisor::Fault::Config), "{fault} after start {start}");
+            events.safe()?;
             config += 1;
-        }
-        last = Some((answers, active));
+            Reply::Refused(Reason::Faulted(fault))
+        };
+        let is_armed = start > cuts.len() || answers.iter().any(|(.., reply)| *reply == expected);
+        ensure!(is_armed, "arming is not answered with {expected:?} after start {start}: {answers:?}");
+        last = Some(answers);
     }
-    let (answers, active) = last.context("no start")?;
-    ensure!((active.length, active.checksum) == frame_of(&new), "the model that was sent last does not run");
+    ensure!(config > 0 || !cuts.contains(&seal), "no fault where it cannot be known what was stored");
+    let answers = last.context("no start")?;
     let acknowledged = Reply::Ack { state: State::Disarmed, target: WireVolts::from_f64(0.0) };
     let last = answers.iter().rfind(|(.., reply)| !matches!(reply, Reply::Fault(_)));
     ensure!(last.is_some_and(|(.., reply)| *reply == acknowledged), "the fault stays: {answers:?}");
     Ok(format!(
-        "reset in the middle of {} of the {} operations of the flash that store a model: the old one ran each time, or arming was refused \
-         ({config} starts), and the next one was stored; DAC zero and enable off throughout",
+        "reset in the middle of {} of the {} operations of the flash that store a model: the old one ran each time, arming was refused \
+         where it could not be known what was stored ({config} starts), and the next model was stored; DAC zero throughout",
         cuts.len(),
         seal + 1
     ))
@@ -207,7 +209,9 @@ pub(super) fn flood(events: &Events, variant: Variant) -> Result<String> {
         )
         .collect();
     let longest = samples.windows(2).map(|pair| pair[1] - pair[0]).max().context("no telemetry")?;
+    let ticks = ticking.times("dac").into_iter().filter(|us| *us > begun).count();
     ensure!(longest <= MOST_TICKS, "{longest} ticks without telemetry");
+    ensure!(samples.len() * MOST_TICKS as usize >= ticks, "{} samples in {ticks} ticks", samples.len());
     answers.retain(|(.., reply)| !matches!(reply, Reply::Telemetry(_)));
     let flooded = answers.iter().filter(|(us, ..)| *us > begun).count();
     ensure!(flooded > 30, "{flooded} answers show little");
@@ -219,7 +223,8 @@ pub(super) fn flood(events: &Events, variant: Variant) -> Result<String> {
     let on_host = drives(control(variant)?, &orders(&schedule, &answers, &written)?);
     equal(&on_host, &written)?;
     Ok(format!(
-        "{flooded} answers and {} samples, at least every {longest} ticks for {EVERY_TICKS}, no tick missed or more than {late:.2} us off its grid, \
+        "{flooded} answers and {} samples, at least every {longest} ticks for {EVERY_TICKS}, no tick missed or more than {late:.2} us off \
+         its grid, \
          all {} codes as on the host",
         samples.len(),
         written.len()
@@ -232,9 +237,11 @@ const MOST_TICKS: u64 = 3 * EVERY_TICKS as u64;
 /// A run in which one tick takes longer than the five that are tolerated: they are counted, and the voltage stays.
 pub(super) fn late(events: &Events, missed: u32) -> Result<String> {
     let (_, ticking) = events.split("watchdog started")?;
-    let (_, after) = events.split("injected")?;
-    let dac = after.times("dac");
+    let (before, after) = events.split("injected")?;
+    let dac: Vec<f64> = before.times("dac").into_iter().rev().take(1).chain(after.times("dac")).collect();
     let longest = dac.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let missed_us = f64::from(missed) * PERIOD_US;
+    ensure!((missed_us..missed_us + 3.0 * PERIOD_US).contains(&longest), "the longest pause was {longest:.0} us");
     ensure!(after.0.iter().filter(|event| event.1 == "dac").all(|event| event.2 != 0), "the voltage does not stay");
     ensure!(!after.0.iter().any(|event| event.2 == "off") && after.times("reset").is_empty(), "it is switched off");
     let last = answers(&ticking)?.into_iter().rev().find_map(|(.., reply)| match reply {
@@ -279,7 +286,7 @@ fn orders(schedule: &Schedule, answers: &[Answer], written: &[Written]) -> Resul
         let Some(next) = written.iter().position(|(at, ..)| at > us) else { continue };
         let tick = match request {
             // Followed before it is answered. All other requests are answered first, and the next tick processes them.
-            Request::Arm | Request::Set(_) => next - 1,
+            Request::Arm | Request::Set(_) => next.checked_sub(1).context("an answer before the first tick")?,
             _ => next,
         };
         orders[tick] = match request {

@@ -10,7 +10,6 @@ mod host;
 mod runs;
 mod schedule;
 
-use std::collections::BTreeSet;
 use std::fs;
 
 use anyhow::{Context, Result, ensure};
@@ -51,14 +50,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let last = schedule::operations()? - 1;
     if args.all {
         let every: Vec<usize> = (0..=last).collect();
-        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, &every, false));
+        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, &every, false).map(drop));
     }
-    one(args.variant, &[0, last / 2, last - 1, last], args.brief)
+    let faults = one(args.variant, &[0, last / 2, last - 1, last], args.brief)?;
+    if args.brief {
+        return Ok(());
+    }
+    let faults = ("faults injected in the image that is flashed, on register models".to_owned(), faults as u64);
+    Tally::now([faults])?.write(&args.variant.tally("boot"))
 }
 
 /// Builds the image, runs it once for each case, and prints what each run showed. `cuts` numbers the operations of the flash in which the
-/// chip is reset; of a `brief` verification are only the runs in which controller or amplifier matter.
-fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<()> {
+/// chip is reset; a `brief` verification has only the runs in which controller or amplifier matter. Returns the number of injected faults.
+fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<usize> {
     let Settings { amplifier, .. } = variant::settings(variant);
     println!(
         "image of the {} controller, {} to {} V",
@@ -89,8 +93,12 @@ fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<()> {
     let stack = elf::symbol(&bytes, "_stack_start")?;
     let python = python::environment(&shell::target_directory()?, "boot", "emulation/models/requirements.txt")?;
     let mut checks = checks::of(&bytes, variant, cuts);
-    checks.retain(|check| !brief || check.is_of_variant());
-    let names: BTreeSet<&str> = checks.iter().map(|check| check.run).collect();
+    let all = checks.len();
+    checks.retain(|check| !brief || check.is_of_variant);
+    if brief {
+        println!("brief: {} of {all} runs", checks.len());
+    }
+    let names: Vec<&str> = checks.iter().map(|check| check.run).collect();
     let case = elf.with_extension("boot.json");
     let case_of = json!({
         "tick": ticks[0].address,
@@ -125,9 +133,5 @@ fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<()> {
         println!("{}: {}", check.run, (check.shows)(&events).context(check.run)?);
     }
     println!("{CANNOT_SHOW}");
-    // All runs but those without a mishap; the flash is cut in one run several times.
-    let faulty = names.iter().filter(|name| !["quiet", "host", "sent"].contains(name));
-    let faults: usize = faulty.map(|name| if *name == "cut" { cuts.len() } else { 1 }).sum();
-    let faults = ("faults injected in the image that is flashed, on register models".to_owned(), faults as u64);
-    Tally::now([faults])?.write(&variant.tally("boot"))
+    Ok(checks.iter().map(|check| check.faults).sum())
 }

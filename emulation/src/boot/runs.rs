@@ -9,24 +9,19 @@ use model::supervisor::{Fault, Mismatch};
 use serde::Deserialize;
 use xtask::variant::Variant;
 
-use super::events::{Event, Events};
+use super::events::{BYTE_US, Event, Events, JITTER_US, PERIOD_US, jitter};
 use super::host;
 use super::schedule::STORED_RESET_MS;
 use crate::variant;
 
-/// Period of the control tick, in us.
-pub(super) const PERIOD_US: f64 = 1000.0;
-/// Largest difference between the earliest and the latest tick relative to their grid, in us: the logger disables
-/// interrupts briefly.
-pub(super) const JITTER_US: f64 = 20.0;
 /// Timeout of the watchdog, in us.
 const WATCHDOG_US: f64 = WATCHDOG_MS as f64 * 1000.0;
-/// Longest time from the last check-in of a task until the output is off, and the round in which it has still checked in, in us.
-const STALL_US: f64 = (LONGEST_STALL_MS + 15) as f64 * 1000.0;
+/// Longest time until the output is off after all tasks but the control task have stopped at once, in us.
+const STALL_US: f64 = LONGEST_STALL_MS as f64 * 1000.0 + 2.0 * PERIOD_US;
 /// Longest time that the amplifier's monitors may disagree with the command, plus the tick that detects it, in us.
 pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;
 /// Duration of the longest frame on the line, in us.
-const FRAME_US: f64 = MAX_FRAME as f64 * 1e7 / 115_200.0;
+const FRAME_US: f64 = MAX_FRAME as f64 * BYTE_US;
 /// Longest time from a panic or fault to zero volts, in us. An instruction takes 1/170 us.
 pub(super) const KILL_US: f64 = 5.0;
 
@@ -70,13 +65,6 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
         WATCHDOG_US / 1e3,
         longest / 1e3
     ))
-}
-
-/// Difference between the latest and the earliest of `ticks` on a grid from the first one on, so that drift and missing ticks show.
-pub(super) fn jitter(ticks: &[f64]) -> f64 {
-    let late = ticks.iter().zip(0u32..).map(|(us, tick)| us - ticks[0] - f64::from(tick) * PERIOD_US);
-    let (earliest, latest) = late.fold((0.0, 0.0), |(least, most): (f64, f64), late| (least.min(late), most.max(late)));
-    latest - earliest
 }
 
 /// A run with a panic, fault or hang: the output is zero and disabled within `within_us` and before the first byte of
@@ -187,7 +175,7 @@ pub(super) fn stalled(events: &Events, image: &[u8]) -> Result<String> {
     let (us, _) = let_go(&dying)?;
     ensure!(us <= STALL_US, "the voltage goes after {us:.0} us");
     let reset_us = restarted.0[0].0 - after.0[0].0;
-    ensure!(reset_us <= STALL_US + WATCHDOG_US, "the watchdog waits for {reset_us:.0} us");
+    ensure!(reset_us <= WATCHDOG_US + PERIOD_US, "the watchdog waits for {reset_us:.0} us");
     let boot = restarted_safe(&restarted, image, "reset=watchdog last_fault=5")?;
     Ok(format!(
         "DAC zero and enable off {:.1} ms later; the watchdog resets the chip after {:.0} ms; `{boot}`",
@@ -202,7 +190,7 @@ pub(super) fn deaf(events: &Events, image: &[u8]) -> Result<String> {
     let (_, restarted) = after.split("reset")?;
     let us = restarted.0[0].0 - after.0[0].0;
     ensure!(us <= WATCHDOG_US, "the watchdog waits for {us:.0} us");
-    let boot = restarted_safe(&restarted, image, "reset=watchdog")?;
+    let boot = restarted_safe(&restarted, image, "reset=watchdog last_fault=5")?;
     Ok(format!("the voltage stays until the watchdog resets the chip {:.0} ms later; `{boot}`", us / 1e3))
 }
 
@@ -410,5 +398,16 @@ mod tests {
         assert!(dying(&[injection.clone(), off.clone(), log.clone(), zero.clone()]).is_err());
         assert!(dying(&[injection.clone(), zero.clone(), log.clone(), off.clone()]).is_err());
         assert!(dying(&[injection, ("dac", 1755.into()), off, zero, log]).is_err());
+    }
+
+    #[test]
+    fn a_voltage_that_is_written_once_more_goes_later_and_one_that_stays_is_an_error() {
+        let (injection, written) = (("injected", 300.into()), ("dac", 1755.into()));
+        let (zero, off) = (("dac", 0.into()), ("enable", "off".into()));
+        let gone = |list: &[(&str, serde_json::Value)]| let_go(&events(list)).map(|(us, _)| us);
+        assert_eq!(gone(&[injection.clone(), off.clone(), zero.clone()]).unwrap(), 2.0);
+        assert_eq!(gone(&[injection.clone(), written.clone(), off.clone(), zero.clone()]).unwrap(), 3.0);
+        assert!(gone(&[injection.clone(), off, zero, written.clone()]).is_err());
+        assert!(gone(&[injection, written]).is_err());
     }
 }

@@ -58,7 +58,7 @@ impl Schedule {
         self.then(STEP_US, end);
     }
 
-    /// Adds the requests that arm, follow two targets and keep the host alive; 20 ms before, a Hello.
+    /// Adds the requests that arm, follow two targets and keep the host alive. A Hello has to come before.
     fn drive(&mut self) {
         self.then(STEP_US, Request::Arm);
         self.then(STEP_US, set(TARGETS_V[0]));
@@ -127,13 +127,16 @@ pub(super) fn sent(variant: Variant) -> Result<Schedule> {
     Ok(schedule)
 }
 
-/// Sends a model again after each of `cuts` resets, restarts, asks what runs and acknowledges a fault of the stored model.
+/// Sends a model again after each of `cuts` resets, having asked what runs and armed; then restarts, asks what runs and acknowledges a
+/// fault of the stored model.
 pub(super) fn cut(cuts: usize) -> Result<Schedule> {
     let model = model()?;
     let mut schedule = Schedule::default();
     for _ in 0..=cuts {
         schedule.then(ERASE_US, Request::Hello);
-        schedule.then(STEP_US, Request::Model);
+        for request in [Request::Model, Request::Arm, Request::Disarm] {
+            schedule.then(STEP_US, request);
+        }
         schedule.send(Block::Model, &model);
     }
     schedule.then(ERASE_US, Request::Restart);
@@ -157,7 +160,7 @@ const fn set(volts: f64) -> Request {
     Request::Set(Desired::ScaledVolts(volts))
 }
 
-/// Bytes as text.
+/// Bytes as hexadecimal text.
 pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
