@@ -1,7 +1,6 @@
 //! The requests of a client, one function each.
 
 use link::adaptation::Adaptation;
-use link::block::PART;
 use link::capture::{Capture, Captured, Row};
 use link::isolation::Isolation;
 use link::{
@@ -181,19 +180,9 @@ impl Client {
 
     /// Sends a block, restarts the MCU, connects again, and checks that it runs the block.
     fn send(&mut self, block: Block, payload: &[u8]) -> Result<Blocks, Failure> {
-        for (number, part) in (0..).zip(payload.chunks(PART)) {
-            let mut bytes = [0; PART];
-            bytes[..part.len()].copy_from_slice(part);
-            self.order(match block {
-                Block::Model => Request::ModelPart { number, bytes },
-                Block::Settings => Request::SettingsPart { number, bytes },
-            })?;
+        for request in Request::sending(block, payload) {
+            self.order(request)?;
         }
-        let (length, checksum) = (payload.len() as u16, link::frame::checksum(payload));
-        self.order(match block {
-            Block::Model => Request::ModelEnd { length, checksum },
-            Block::Settings => Request::SettingsEnd { length, checksum },
-        })?;
         self.restart()?;
         let (what, blocks) = match block {
             Block::Model => ("model", self.models()?),

@@ -59,6 +59,11 @@ impl Part {
         }
         Self { number, length: payload.len() as u16, bytes }
     }
+
+    /// Every part of a payload of at most 256 parts, in order.
+    pub fn all(payload: &[u8]) -> impl Iterator<Item = Self> {
+        (0..=u8::MAX).take(payload.len().div_ceil(PART)).map(|number| Self::of(number, payload))
+    }
 }
 
 /// Serialises the content of a block as a payload. `None` if it is longer than `N` bytes.

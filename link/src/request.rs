@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::adaptation::Adaptation;
-use crate::block::PART;
+use crate::block::{Block, PART, Part};
 use crate::capture::Capture;
+use crate::checksum::checksum;
 use crate::fault::Fault;
 use crate::isolation::Isolation;
 use crate::value::Desired;
@@ -97,4 +98,18 @@ impl Request {
     /// First byte of a serialised [`Request::Disarm`]. It is the same in every protocol version, so that any host can disarm
     /// any MCU.
     pub(crate) const DISARM: u8 = 4;
+
+    /// The requests that send a payload of at most 256 parts of [`PART`] bytes: the parts in order, then the end.
+    pub fn sending(block: Block, payload: &[u8]) -> impl Iterator<Item = Self> {
+        let parts = Part::all(payload).map(move |Part { number, bytes, .. }| match block {
+            Block::Model => Self::ModelPart { number, bytes },
+            Block::Settings => Self::SettingsPart { number, bytes },
+        });
+        let (length, checksum) = (payload.len() as u16, checksum(payload));
+        let end = match block {
+            Block::Model => Self::ModelEnd { length, checksum },
+            Block::Settings => Self::SettingsEnd { length, checksum },
+        };
+        parts.chain(core::iter::once(end))
+    }
 }

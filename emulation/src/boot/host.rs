@@ -67,8 +67,7 @@ pub(super) fn sent(events: &Events, variant: Variant) -> Result<String> {
     let (_, storing) = before.split("watchdog started")?;
     let (erased, programmed) = (storing.times("erased").len(), storing.times("programmed").len());
     let (settings, model) = (schedule::settings(variant)?, schedule::model()?);
-    let words =
-        [&settings, &model].map(|payload| payload.len().div_ceil(link::block::PART) * 4 + 2).iter().sum::<usize>();
+    let words = schedule::words(&settings) + schedule::words(&model);
     // One for the first part of each block, and its other page once the block is sealed, since nothing was stored.
     ensure!(
         (erased, programmed) == (4, words),

@@ -16,7 +16,7 @@ use crate::variant;
 
 /// Timeout of the watchdog, in us.
 const WATCHDOG_US: f64 = WATCHDOG_MS as f64 * 1000.0;
-/// Longest time until the output is off after all tasks but the control task have stopped at once, in us.
+/// Longest time until the output is off after all tasks but the control task have stopped together, in us.
 const STALL_US: f64 = LONGEST_STALL_MS as f64 * 1000.0 + 2.0 * PERIOD_US;
 /// Longest time that the amplifier's monitors may disagree with the command, plus the tick that detects it, in us.
 pub(super) const MONITOR_US: f64 = 1e6 * SUPERVISION.monitor_time_s + PERIOD_US;

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use firmware::settings::{WATCHDOG_MS, built_in};
-use firmware::store::{Memory, Page, Pages, Side, Store};
+use firmware::store::{Memory, Page, Pages, Side, Store, WORD};
 use link::frame::checksum;
 use link::nonce::Nonces;
 use link::{Block, Desired, Fault, Frame, Part, Reason, Request, Sequence, WireModel, WireSettings, block};
@@ -40,22 +40,11 @@ impl Schedule {
         self.0.push((at, request));
     }
 
-    /// Adds the parts of a block's payload and its end.
+    /// Adds the parts of a block's payload, of which there are more than one, and its end.
     fn send(&mut self, block: Block, payload: &[u8]) {
-        for number in 0..payload.chunks(block::PART).count() as u8 {
-            let Part { number, bytes, .. } = Part::of(number, payload);
-            let part = match block {
-                Block::Model => Request::ModelPart { number, bytes },
-                Block::Settings => Request::SettingsPart { number, bytes },
-            };
-            self.then(if number <= 1 { ERASE_US } else { STEP_US }, part);
+        for (number, request) in Request::sending(block, payload).enumerate() {
+            self.then(if number <= 1 { ERASE_US } else { STEP_US }, request);
         }
-        let (length, checksum) = (payload.len() as u16, checksum(payload));
-        let end = match block {
-            Block::Model => Request::ModelEnd { length, checksum },
-            Block::Settings => Request::SettingsEnd { length, checksum },
-        };
-        self.then(STEP_US, end);
     }
 
     /// Adds the requests that arm, follow two targets and keep the host alive. A Hello has to come before.
@@ -148,9 +137,10 @@ pub(super) fn cut(cuts: usize) -> Result<Schedule> {
 
 /// Sends the first part of a model, then asks what runs and arms.
 pub(super) fn protected() -> Result<Schedule> {
-    let Part { number, bytes, .. } = Part::of(0, &model()?);
     let mut schedule = Schedule::default();
-    for request in [Request::Hello, Request::ModelPart { number, bytes }, Request::Model, Request::Arm] {
+    let model = model()?;
+    let first = Request::sending(Block::Model, &model).next();
+    for request in [Request::Hello].into_iter().chain(first).chain([Request::Model, Request::Arm]) {
         schedule.then(STEP_US, request);
     }
     Ok(schedule)
@@ -208,14 +198,19 @@ pub(super) fn old_model() -> Result<Vec<u8>> {
 pub(super) fn page(block: Block, payload: &[u8]) -> Result<Vec<u8>> {
     let mut store = Store::new(Memory::default());
     let refused = |reason: Reason| anyhow::anyhow!("{reason}");
-    for number in 0..payload.chunks(block::PART).count() as u8 {
-        store.part(block, number, &Part::of(number, payload).bytes).map_err(refused)?;
+    for Part { number, bytes, .. } in Part::all(payload) {
+        store.part(block, number, &bytes).map_err(refused)?;
     }
     store.end(block, u16::try_from(payload.len())?, checksum(payload), |_, _| Ok(())).map_err(refused)?;
     Ok(store.pages().bytes(Page { block, side: Side::A }).to_vec())
 }
 
-/// Number of operations of the flash with which a model is stored: one that erases, a word each, and two that seal it.
+/// Number of words with which a payload is stored: those of its parts, and two that seal it.
+pub(super) fn words(payload: &[u8]) -> usize {
+    payload.len().div_ceil(block::PART) * block::PART / WORD + 2
+}
+
+/// Number of operations of the flash with which a model is stored: one that erases, and one for each word.
 pub(super) fn operations() -> Result<usize> {
-    Ok(1 + model()?.len().div_ceil(block::PART) * block::PART / 8 + 2)
+    Ok(1 + words(&model()?))
 }

@@ -28,7 +28,7 @@ Examples:
   vsj identify data/sample_hysteresis.csv          a table and remarks
   vsj identify a.csv b.csv                         two records of one spring
   vsj identify hv.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
-  vsj identify record.csv --out out/spring        with a page and plant.toml
+  vsj identify record.csv --out out/spring         with a page and plant.toml
   vsj diagnose record.csv --plant out/spring/plant.toml
   vsj bound --plant out/spring/plant.toml --identified out/spring/identify.json
   vsj identify record.csv --json | jq .nominal")]

@@ -177,7 +177,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     };
     let port = Port::open(&arguments.port, baud, timeout)?;
     let (client, status) = Client::greet(port, patience).with_context(|| arguments.port.clone())?;
-    let mut session = Session { client, status, json };
+    let mut session = Session { client, status, json, brown_out: None };
     // The other commands leave the output as it is, and may end anywhere.
     if let Command::Set(_) | Command::Arm { .. } | Command::Watch(_) | Command::Record(_) | Command::Capture(_) =
         arguments.command

@@ -9,7 +9,7 @@ use host_sim::output::terminal::{json, print, remark};
 use host_sim::signals::{end, on_signal};
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
-use link::{IsolationReport, Request, Status, WireVolts};
+use link::{BrownOut, IsolationReport, Request, Status, WireVolts};
 use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
@@ -26,6 +26,8 @@ pub(super) struct Session {
     pub(super) client: Client,
     pub(super) status: Status,
     pub(super) json: bool,
+    /// Level of the brown-out reset, an option of the chip that stays what it is; `None` until it was asked for.
+    pub(super) brown_out: Option<Option<BrownOut>>,
 }
 
 impl Session {
@@ -87,7 +89,11 @@ impl Session {
     pub(super) fn report(&mut self) -> Result<StatusReport> {
         let isolation = self.isolation(Isolation::Read)?;
         let adaptation = self.client.adaptation(Adaptation::Read).with_context(|| self.client.name().to_owned())?;
-        let brown_out = self.client.brown_out().with_context(|| self.client.name().to_owned())?;
+        let brown_out = match self.brown_out {
+            Some(known) => known,
+            None => self.client.brown_out().with_context(|| self.client.name().to_owned())?,
+        };
+        self.brown_out = Some(brown_out);
         Ok(StatusReport::new(&self.status, isolation.as_ref(), adaptation.as_ref(), brown_out))
     }
 
