@@ -40,7 +40,7 @@ fn every_single_effect_is_named() {
     assert!(summary.held_out_ratio.is_some_and(|ratio| ratio <= 1.1), "held-out error: {:?}", summary.held_out_ratio);
 }
 
-/// 24 records, with other forms than the records of single effects.
+/// 27 records, with other forms than the records of single effects.
 #[test]
 fn every_effect_in_another_form_is_named() {
     let (_, summary, wrong) = outcomes(&part::forms(FIRST, 3));
@@ -54,7 +54,7 @@ fn the_papers_spring_gets_no_finding() {
     assert!(1.0 - summary.nothing_extra <= 0.025, "{}\n{wrong}", summary.nothing_extra);
 }
 
-/// 29 records, every fourth of the pairs of causes of different blocks.
+/// 32 records, every fourth of the pairs of causes of different blocks.
 #[test]
 fn two_effects_are_both_named() {
     let jobs: Vec<Job> = part::pairs(FIRST, 1).into_iter().step_by(4).collect();
@@ -84,28 +84,28 @@ fn effects_of_1_5_times_the_isolable_size_are_named() {
     let named = outcomes.iter().filter(|outcome| outcome.all_named()).count();
     println!("{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
     // The criterion is 95 %; 32 are named today. Each is a borderline case, which other held-out segments may change.
-    assert!(named >= 28, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
+    assert!(named >= 30, "{named} of {}\n{}", outcomes.len(), tables::wrong(&jobs, &outcomes));
 }
 
-/// 14 records, every fourth pair at full size. Today all begin with a true cause and none has an untrue name.
+/// 16 records, every fourth pair at full size. Today 15 begin with a true cause, and one has an untrue name above 0.9.
 #[test]
 fn pairs_that_share_a_stage_begin_with_a_true_cause() {
     let full_size = shared::cases(FIRST, 1).into_iter().filter(|case| case.kinds == ["full size"]);
     let cases: Vec<_> = full_size.step_by(4).collect();
     let answers = graded(&cases);
     let count = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
-    assert!(count(|answer| answer.first_is_right) >= 12, "{}", answer_table::wrong(&answers));
-    assert!(count(Answer::is_sure_and_wrong) <= 2, "{}", answer_table::wrong(&answers));
+    assert!(count(|answer| answer.first_is_right) >= 14, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_sure_and_wrong) <= 1, "{}", answer_table::wrong(&answers));
 }
 
-/// 22 records, every sixth of the plain steps.
+/// 24 records, every sixth of the plain steps.
 #[test]
 fn plain_steps_get_no_confident_wrong_name() {
     let cases: Vec<_> = steps::cases(FIRST, 1).into_iter().step_by(6).collect();
     let answers = graded(&cases);
     let count = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
-    assert!(count(Answer::is_right) + count(Answer::is_honest) >= 19, "{}", answer_table::wrong(&answers));
-    assert!(count(Answer::is_sure_and_wrong) <= 2, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_right) + count(Answer::is_honest) >= 20, "{}", answer_table::wrong(&answers));
+    assert!(count(Answer::is_sure_and_wrong) <= 1, "{}", answer_table::wrong(&answers));
 }
 
 fn graded(cases: &[Case]) -> Vec<Answer> {
