@@ -4,7 +4,8 @@
 //! nothing. A run of them is a fault of the sensor if it is far longer than all others, more than chance makes, and
 //!
 //! - is preceded and followed by noise while the voltage rests, or
-//! - ends with a jump although the voltage has rested, as the reading catches up with the response, or
+//! - ends with a jump although the voltage has rested, or rests there if the run began in the middle of a movement, as the reading
+//!   catches up with the response, or
 //! - began before a change of the voltage after which the readings move elsewhere, or
 //! - begins and ends in the middle of a movement, while a voltage that never rests keeps changing as it does elsewhere.
 //!
@@ -233,9 +234,17 @@ impl Readings {
             && after.into_iter().all(|row| (self.value[row] - self.value[run.start]).abs() > self.typical)
     }
 
-    /// True if the run ends with a jump after the voltage has rested for half of it.
+    /// True if the readings move right before the run.
+    fn stops(&self, run: &Range<usize>) -> bool {
+        run.start >= BESIDE && self.moves(run.start - BESIDE..run.start)
+    }
+
+    /// True if the run ends with a jump after the voltage has rested for half of it, or, if it began in the middle of a movement, while
+    /// the voltage rests.
     fn catches_up_at_rest(&self, run: &Range<usize>) -> bool {
-        self.catches_up(run, MOVES * self.typical) && self.rests(run.start + run.len() / 2..run.end + 1)
+        let half = run.start + run.len() / 2;
+        self.catches_up(run, MOVES * self.typical)
+            && (self.rests(half..run.end + 1) || self.stops(run) && self.rests(run.end - MARGIN..run.end + MARGIN + 1))
     }
 
     /// True if the voltage changes in the first half of the run, and the readings elsewhere move in as many rows after such a change.
@@ -258,9 +267,8 @@ impl Readings {
     /// comes to rest, at a bound, in a dead zone or within a step of the sensor, slows down before, or stays there as well.
     fn stops_in_a_movement(&self, run: &Range<usize>) -> bool {
         let after = run.end..(run.end + BESIDE).min(self.value.len());
-        let stops = || run.start >= BESIDE && self.moves(run.start - BESIDE..run.start);
         let goes_on = || after.len() < 2 || self.moves(after.clone());
-        let is_abrupt = stops() && goes_on() || self.catches_up(run, self.largest);
+        let is_abrupt = self.stops(run) && goes_on() || self.catches_up(run, self.largest);
         let changes = |start: usize| !self.rests(start..start + run.len() / 2);
         if !is_abrupt || !changes(run.start) {
             return false;
@@ -480,6 +488,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Two steps of the voltage: the reading stops while the first response still rises, and jumps some time after the second step.
+    #[test]
+    fn a_sensor_may_stick_in_a_response_until_after_the_next_step() {
+        let mut record = noisy();
+        record.rows.truncate(480);
+        let held = held_in(record, &[[225, 420]], None);
+        assert_eq!(stuck_in(&held).unwrap().rows, rows_of(&[[225, 420]]));
     }
 
     #[test]
