@@ -33,7 +33,7 @@ pub enum Forms {
     /// Those that every search tries.
     #[default]
     Common,
-    /// The others, for a record in which those leave structure.
+    /// The others, for a record in which those leave structure or several effects are found.
     Rare,
 }
 

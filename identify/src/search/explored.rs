@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::effects::model::Block;
 use crate::search::evaluated::Evaluated;
-use crate::search::evaluator::{Breadth, Evaluator};
+use crate::search::evaluator::Evaluator;
 use crate::search::extend::contained;
 use crate::search::scored::{Scored, effects};
 use crate::search::structure_search::{FirstFits, Search};
@@ -32,7 +32,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     /// Continues with what an earlier search of the same record has evaluated, with the same prices; not exhaustive.
     pub fn resumed(evaluator: &'e mut E, explored: Explored) -> Self {
         let Explored { evaluated, first_fits } = explored;
-        Self { evaluated, first_fits, breadth: Breadth::default(), ..Self::new(evaluator) }
+        Self { evaluated, first_fits, exhaustive: false, ..Self::new(evaluator) }
     }
 
     /// The best structure with an effect among those that were evaluated; `None` if none has it.

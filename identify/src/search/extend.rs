@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::effects::contains;
 use crate::effects::model::Model;
 use crate::fit::engine::Fit;
-use crate::search::evaluator::Evaluator;
+use crate::search::evaluator::{Breadth, Evaluator, Forms};
 use crate::search::scored::{Scored, effects};
 use crate::search::structure_search::{FirstFits, Search};
 use crate::stats::thresholds::empirical::NATS_TO_LOSE_AT_FIRST;
@@ -34,22 +34,30 @@ impl<E: Evaluator> Search<'_, E> {
         children
     }
 
-    /// First fits of all extensions, or of those by the effect `wanted`; kept for the next pass, which differs in prices only.
+    /// First fits of all extensions, or of those by the effect `wanted`.
     pub(super) fn first_fits(&mut self, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
+        let mut fits = self.first_fits_of(Forms::Common, node, wanted);
+        if self.tries_rare_forms {
+            fits.extend(self.first_fits_of(Forms::Rare, node, wanted));
+        }
+        fits
+    }
+
+    /// The same in some forms; kept for the next pass, which differs in prices, or tries further forms, only.
+    fn first_fits_of(&mut self, forms: Forms, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
         let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();
-        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted && kept.forms == self.breadth.forms)
-        {
+        if let Some(kept) = kept.find(|kept| kept.of == *model && kept.by == wanted && kept.forms == forms) {
             return kept.fits.clone();
         }
         let new =
             |effect| wanted.is_none_or(|wanted| wanted == effect) && !model.has(effect) && !contained(effect, model);
-        let fits = self.evaluator.extended(node, self.breadth, &new);
+        let fits = self.evaluator.extended(node, Breadth { exhaustive: self.exhaustive, forms }, &new);
         if self.keeps_first_fits {
             self.first_fits.entry(model.structure()).or_default().push(FirstFits {
                 of: model.clone(),
                 by: wanted,
-                forms: self.breadth.forms,
+                forms,
                 fits: fits.clone(),
             });
         }
@@ -62,7 +70,7 @@ impl<E: Evaluator> Search<'_, E> {
             fit.log_likelihood - self.evaluated.price(self.evaluator, fit) - fit.model.points().len() as f64
         };
         let mut fits: Vec<(f64, Fit)> = first_fits.into_iter().map(|fit| (first_score(&fit), fit)).collect();
-        if !self.breadth.exhaustive {
+        if !self.exhaustive {
             let lost = first_score(node) - NATS_TO_LOSE_AT_FIRST.get();
             fits.retain(|(score, _)| *score > lost);
         }
@@ -85,7 +93,7 @@ impl<E: Evaluator> Search<'_, E> {
             .filter(|(_, fit)| fit.white_noise_log_likelihood > node.white_noise_log_likelihood)
             .collect();
         plain.sort_by(|a, b| b.1.white_noise_log_likelihood.total_cmp(&a.1.white_noise_log_likelihood));
-        if self.breadth.exhaustive && !node.noise.autocorrelation.is_white() {
+        if self.exhaustive && !node.noise.autocorrelation.is_white() {
             fits.extend(plain.into_iter().take(as_independent));
         }
         let mut evaluated = Vec::new();

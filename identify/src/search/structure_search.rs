@@ -6,7 +6,7 @@ use crate::effects::EFFECTS;
 use crate::effects::model::{Block, Model};
 use crate::fit::engine::Fit;
 use crate::search::evaluated::Evaluated;
-use crate::search::evaluator::{Breadth, Evaluator, Forms};
+use crate::search::evaluator::{Evaluator, Forms};
 use crate::search::scored::{Scored, effects};
 use crate::search::warm_start::WarmStart;
 use crate::stats::thresholds::empirical::NATS_TO_LOSE_IN_BEAM;
@@ -30,8 +30,10 @@ pub struct Search<'e, E> {
     pub(super) first_fits: HashMap<Vec<Block>, Vec<FirstFits>>,
     /// True if first fits are kept for another pass.
     pub(super) keeps_first_fits: bool,
-    /// Which extensions are fitted.
-    pub(super) breadth: Breadth,
+    /// True if effects are tried, too, that the noise's autocorrelation may hide.
+    pub(super) exhaustive: bool,
+    /// True if the forms that are seldom needed are tried as well.
+    pub(super) tries_rare_forms: bool,
 }
 
 /// First fits of a model's extensions.
@@ -56,7 +58,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
             extended,
             first_fits,
             keeps_first_fits: true,
-            breadth: Breadth { exhaustive: true, forms: Forms::Common },
+            exhaustive: true,
+            tries_rare_forms: false,
         }
     }
 
@@ -81,44 +84,37 @@ impl<'e, E: Evaluator> Search<'e, E> {
             {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 let best = self.repriced(best, &mut progress);
-                let leaves_structure = self.evaluator.leaves_structure(&best.fit);
-                return if leaves_structure { self.with_rare_forms(best, &mut progress) } else { best };
+                return self.with_rare_forms(best, &mut progress);
             }
             self.extended.clear();
             self.evaluated.reprice(self.evaluator, penalty_factor);
         }
     }
 
-    /// Tries the forms that are seldom needed, with the work that was kept for them: for the best structure's causes, alone, in
-    /// addition to it, and in place of each of its blocks; then exchanges and extends what was found as usual.
+    /// Searches again with the forms that are seldom needed as well, one structure at a time, with the work that was kept for them; for a
+    /// structure that leaves something, or for several effects, whose common forms may stand in for a rare one. A structure that leaves
+    /// nothing but noise is replaced by a simpler one only.
     fn with_rare_forms(&mut self, best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
-        self.evaluator.begin_rare_forms();
-        let common = best.fit.model.structure();
-        self.try_forms(Forms::Rare);
-        let reformed = self.reformed(best);
-        let mut best = self.pruned(reformed);
-        for node in [self.root(), best.clone()] {
-            if self.evaluator.is_over() {
-                break;
-            }
-            let children = self.children(&node).into_iter();
-            best = children.fold(best, |best, other| if other.score > best.score { other } else { best });
-        }
-        best = self.pruned(best);
-        best = self.settled(best);
-        self.try_forms(Forms::Common);
-        if best.fit.model.structure() == common {
+        let leaves_structure = self.evaluator.leaves_structure(&best.fit);
+        let blocks = best.fit.model.blocks.len();
+        if !leaves_structure && blocks < 2 {
             return best;
         }
-        progress(&best);
-        // The other causes may have stood in for what the common forms of this one could not do.
-        let best = self.settled(best);
+        self.evaluator.begin_rare_forms();
+        self.try_rare_forms(true);
+        let other = self.beam_search(1, progress);
+        self.try_rare_forms(false);
+        if other.score <= best.score || !leaves_structure && other.fit.model.blocks.len() >= blocks {
+            return best;
+        }
+        progress(&other);
+        let best = self.settled(other);
         self.extended_greedily(best, progress)
     }
 
-    /// Extends structures by other forms from here on.
-    fn try_forms(&mut self, forms: Forms) {
-        self.breadth.forms = forms;
+    /// Extends structures by the forms that are seldom needed as well from here on, or by the common ones alone.
+    fn try_rare_forms(&mut self, tries: bool) {
+        self.tries_rare_forms = tries;
         self.extended.clear();
     }
 
@@ -128,7 +124,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
         WarmStart { models, penalty_factor }: WarmStart,
         mut progress: impl FnMut(&Scored),
     ) -> Scored {
-        self.breadth.exhaustive = false;
+        self.exhaustive = false;
         // On all rows of a long record they would take much memory.
         self.keeps_first_fits = false;
         self.evaluated.penalty_factor = penalty_factor;
@@ -149,7 +145,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
             return best;
         }
         // An effect too quick for a part of the rows may be hidden by the noise's autocorrelation.
-        self.breadth.exhaustive = true;
+        self.exhaustive = true;
         self.extended.clear();
         self.extended_greedily(best, &mut progress)
     }
@@ -223,8 +219,14 @@ impl<'e, E: Evaluator> Search<'e, E> {
         self.evaluated.best_without(effect).expect("the search starts from no effect at all")
     }
 
-    /// One beam search at the present penalty factor.
+    /// One search at the present penalty factor.
     fn pass(&mut self, progress: &mut impl FnMut(&Scored)) -> Scored {
+        let best = self.beam_search(BEAM, progress);
+        self.settled(best)
+    }
+
+    /// Extends the `width` best structures, and the likeliest of the others under independent noise, as long as that may raise the score.
+    fn beam_search(&mut self, width: usize, progress: &mut impl FnMut(&Scored)) -> Scored {
         let mut best = self.start();
         let mut beam = vec![best.clone()];
         let mut waited = 0;
@@ -244,7 +246,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
                 }
                 beam = vec![best.clone()];
             }
-            let mut next = self.next(&beam);
+            let mut next = self.next(&beam, width);
             // Structures that may lose score for a while are left as they are: pruning would only undo them.
             next = next.into_iter().map(|it| if it.score > best.score { self.pruned(it) } else { it }).collect();
             if let Some(first) = next.first().cloned()
@@ -266,11 +268,11 @@ impl<'e, E: Evaluator> Search<'e, E> {
             }
             beam = next;
         }
-        self.settled(best)
+        best
     }
 
-    /// The next beam: the best structures with one block more, and the likeliest of the others under independent noise.
-    fn next(&mut self, beam: &[Scored]) -> Vec<Scored> {
+    /// The next beam: the `width` best structures with one block more, and the likeliest of the others under independent noise.
+    fn next(&mut self, beam: &[Scored], width: usize) -> Vec<Scored> {
         let mut next: Vec<Scored> = Vec::new();
         for node in beam {
             if self.evaluator.is_over() {
@@ -289,8 +291,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
         }
         next.sort_by(|a, b| b.score.total_cmp(&a.score));
         distinct(&mut next);
-        let beam = if self.evaluator.is_scarce() { 1 } else { BEAM };
-        let rest = next.split_off(beam.min(next.len()));
+        let width = if self.evaluator.is_scarce() { 1 } else { width };
+        let rest = next.split_off(width.min(next.len()));
         next.extend(
             rest.into_iter()
                 .max_by(|a, b| a.fit.white_noise_log_likelihood.total_cmp(&b.fit.white_noise_log_likelihood)),
