@@ -81,6 +81,9 @@ fn status_and_isolation_show_what_the_isolation_bank_says_and_its_alarm_is_ackno
     assert!(good(port, &["status"]).contains("isolation  quiet\n"));
 }
 
+/// The level that the board should have.
+const BROWN_OUT: BrownOut = BrownOut { level: 4, expected: 4 };
+
 #[test]
 fn status_shows_the_brown_out_level_of_a_board_that_has_one() {
     let status = |brown_out| {
@@ -89,11 +92,23 @@ fn status_shows_the_brown_out_level_of_a_board_that_has_one() {
     };
     let (text, value) = status(None);
     assert!(!text.contains("brown-out") && value.is_null(), "{text}");
-    let (text, value) = status(Some(BrownOut { level: 4, expected: 4 }));
+    let (text, value) = status(Some(BROWN_OUT));
     assert!(text.contains("brown-out  level 4\n"), "{text}");
     assert_eq!((&value["level"], &value["expected"]), (&4.into(), &4.into()));
     let (text, _) = status(Some(BrownOut { level: 0, expected: 4 }));
     assert!(text.contains("brown-out  level 0, expected 4: "), "{text}");
+}
+
+/// Its program refuses what it does not know.
+#[test]
+fn the_status_of_an_older_program_shows_what_it_knows() {
+    let mcu = Mcu::on_socket(Setup { is_older: true, brown_out: Some(BROWN_OUT), ..Setup::default() });
+    let (text, status) = (good(&mcu.port, &["status"]), json(&mcu.port, &["status"]));
+    assert!(text.contains("state      disarmed, ") && text.contains("running    "), "{text}");
+    for name in ["brown_out", "isolation", "adaptation"] {
+        assert!(status[name].is_null(), "{name}: {status}");
+        assert!(!text.contains(&name.replace('_', "-")), "{name}: {text}");
+    }
 }
 
 /// Read from what the MCU has noted, tick by tick: how fast this machine is decides nothing.

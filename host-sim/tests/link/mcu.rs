@@ -20,8 +20,8 @@ use link::isolation::{Isolation, Off};
 use link::reply::Firmware;
 use link::session::Counters;
 use link::{
-    About, AdaptationReport, Block, BrownOut, Command, Controller, Fault, IsolationReport, Notice, Reply, Server,
-    State, Step, Telemetry, View,
+    About, AdaptationReport, Block, BrownOut, Command, Controller, Fault, IsolationReport, Notice, Packet, Reason,
+    Receiver, Reply, Server, State, Step, Telemetry, View,
 };
 use model::adaptation::Phase;
 use model::stiffness::{Cantilever, YoungsModulus};
@@ -47,6 +47,8 @@ pub(crate) struct Setup {
     pub(crate) says_verdict: bool,
     /// Level of the brown-out reset.
     pub(crate) brown_out: Option<BrownOut>,
+    /// True if the MCU's program is from before the requests for the isolation bank, the adaptation and the brown-out level.
+    pub(crate) is_older: bool,
     /// Nothing that the MCU sends arrives any more, see [`Shared::mute`], as soon as this is true of a sample.
     pub(crate) mute_when: fn(&Telemetry) -> bool,
 }
@@ -63,6 +65,7 @@ impl Default for Setup {
             dac_bits: 12,
             says_verdict: true,
             brown_out: None,
+            is_older: false,
             mute_when: |_| false,
         }
     }
@@ -269,6 +272,19 @@ impl Drop for Mcu {
     }
 }
 
+/// Answer to a request that the program does not know.
+const UNKNOWN: Reply = Reply::Refused(Reason::UnknownRequest);
+
+/// True if the bytes of an answer say the level of the brown-out reset.
+fn says_brown_out(bytes: &[u8]) -> bool {
+    let mut receiver = Receiver::new();
+    let mut says = |&byte: &u8| {
+        let packet = receiver.on_byte(byte);
+        packet.is_some_and(|packet| matches!(Packet::read::<Reply>(&packet), Ok(Reply::BrownOut(_))))
+    };
+    bytes.iter().any(|byte| says(byte))
+}
+
 /// The program of the MCU.
 struct Chip {
     setup: Setup,
@@ -377,7 +393,16 @@ impl Chip {
                 self.report_faults(out);
                 out.extend_from_slice(self.server.command_done(&self.view));
             }
-            Some(Step::Send(bytes)) => out.extend_from_slice(bytes),
+            Some(Step::Send(bytes)) => {
+                let mut sent = bytes.to_vec();
+                if self.setup.is_older && says_brown_out(&sent) {
+                    sent = self.server.answered(&UNKNOWN).to_vec();
+                }
+                out.extend(sent);
+            }
+            Some(Step::Isolation(_) | Step::Adaptation(_)) if self.setup.is_older => {
+                out.extend_from_slice(self.server.answered(&UNKNOWN));
+            }
             Some(Step::Update(block, update)) => {
                 let kept = update::execute(&mut self.store, block, update, &BUILT_IN);
                 out.extend_from_slice(self.server.updated(block, kept, &self.view));
