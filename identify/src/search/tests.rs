@@ -6,7 +6,7 @@ use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::Fit;
 use crate::noise::Noise;
-use crate::search::evaluator::Breadth;
+use crate::search::evaluator::{Breadth, Forms};
 use crate::search::{Evaluator, Search, WarmStart, effects};
 
 /// Price of every block, in nats.
@@ -24,6 +24,8 @@ struct Tabulated {
     clean: f64,
     /// Effect that only an exhaustive search finds.
     hidden: Option<usize>,
+    /// Effect that also has a form that is seldom needed, and the log-likelihood of every set with it.
+    rare: Option<(usize, f64)>,
     /// Effect that cannot be distinguished from another cause.
     another: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
@@ -45,10 +47,16 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         quiet: None,
         clean: f64::INFINITY,
         hidden: None,
+        rare: None,
         another: None,
         fits: 0,
         most_fits: isize::MAX,
     }
+}
+
+/// The form of an effect that is seldom needed.
+fn rare_form(effect: usize) -> Block {
+    Block { effect, form: 1 }
 }
 
 impl Evaluator for Tabulated {
@@ -58,6 +66,9 @@ impl Evaluator for Tabulated {
         let of_part = self.worth.iter().filter(|(part, _)| part.is_subset(&has));
         let log_likelihood =
             of_part.map(|(part, worth)| worth + (has.len() - part.len()) as f64).fold(has.len() as f64, f64::max);
+        let is_rare = |effect| model.blocks.iter().any(|(block, _)| *block == rare_form(effect));
+        let of_rare = self.rare.filter(|(effect, _)| is_rare(*effect)).map(|(_, worth)| worth);
+        let log_likelihood = of_rare.map_or(log_likelihood, |worth| log_likelihood.max(worth));
         let mut noise = Noise::default_robust();
         noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
         Fit {
@@ -87,7 +98,16 @@ impl Evaluator for Tabulated {
         fit.log_likelihood
     }
 
-    fn extended(&mut self, fit: &Fit, Breadth { exhaustive, .. }: Breadth, wanted: &dyn Fn(usize) -> bool) -> Vec<Fit> {
+    fn extended(
+        &mut self,
+        fit: &Fit,
+        Breadth { exhaustive, forms }: Breadth,
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> Vec<Fit> {
+        if forms == Forms::Rare {
+            let rare = self.rare.map(|(effect, _)| effect).filter(|effect| wanted(*effect));
+            return rare.into_iter().map(|effect| self.fit(fit.model.with(rare_form(effect), Vec::new()))).collect();
+        }
         let tried = |effect: &usize| wanted(*effect) && (exhaustive || self.hidden != Some(*effect));
         let blocks =
             (0..EFFECTS.len()).filter(tried).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
@@ -158,6 +178,21 @@ fn a_block_that_stands_in_for_two_is_replaced_by_them() {
     let mut adequate = Tabulated { clean: 80.0, ..tabulated(&worth) };
     assert_eq!(found(&mut adequate), ["resonance"]);
     assert!(2 * adequate.fits < evaluator.fits, "{} {}", adequate.fits, evaluator.fits);
+}
+
+/// Nothing but noise is left by the common forms of two causes, and of one.
+#[test]
+fn a_rare_form_of_one_cause_replaces_common_forms_of_several() {
+    let pair: &[&str] = &["gain-error", "charge-leakage"];
+    let worth: [(&[&str], f64); 2] = [(&["gain-error"], 60.0), (pair, 100.0)];
+    let of_rare = |worth_of_rare: f64, worth: &[(&[&str], f64)]| {
+        let rare = Some((effect("instantaneous-share"), worth_of_rare));
+        found(&mut Tabulated { rare, clean: 90.0, ..tabulated(worth) })
+    };
+    assert_eq!(of_rare(95.0, &worth), ["instantaneous-share"]);
+    assert_eq!(of_rare(85.0, &worth), pair, "it has the smaller score");
+    assert_eq!(of_rare(105.0, &[(&["gain-error"], 100.0)]), ["gain-error"], "it is not simpler");
+    assert_eq!(of_rare(95.0, &[(&["gain-error"], 80.0)]), ["instantaneous-share"], "the other leaves structure");
 }
 
 #[test]
