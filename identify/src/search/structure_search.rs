@@ -93,7 +93,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
 
     /// Searches again with the forms that are seldom needed as well, one structure at a time, with the work that was kept for them; for a
     /// structure that leaves something, or for several effects, whose common forms may stand in for a rare one. A structure that leaves
-    /// nothing but noise is replaced by a simpler one only.
+    /// nothing but noise is replaced by a simpler one only; what was found remains its rival.
     fn with_rare_forms(&mut self, best: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         let leaves_structure = self.evaluator.leaves_structure(&best.fit);
         let blocks = best.fit.model.blocks.len();
@@ -102,7 +102,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
         }
         self.evaluator.begin_rare_forms();
         self.try_rare_forms(true);
-        let other = self.beam_search(1, progress);
+        let other = self.beam_search(1, &mut |_| ());
         self.try_rare_forms(false);
         if other.score <= best.score || !leaves_structure && other.fit.model.blocks.len() >= blocks {
             return best;
