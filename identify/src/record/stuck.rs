@@ -97,6 +97,10 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     };
     let (jumped, others): (Vec<_>, Vec<_>) =
         runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
+    // Of a contact that is loose, so are shorter losses and those next to a step of the voltage.
+    let is_same = |run: &Range<usize>| jumped.iter().any(|of| readings.equal(run.start, readings.value[of.start]));
+    let (lost, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|run| is_same(run) && readings.jumps_and_returns(run));
     let others: Vec<Range<usize>> = others.into_iter().filter(|run| !is_bound(run)).collect();
     let shortest = shortest_stuck(&others).unwrap_or(usize::MAX);
     let long: Vec<Range<usize>> = others.into_iter().filter(|run| run.len() >= shortest).collect();
@@ -108,7 +112,7 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     };
     let sticks = long.iter().any(|run| !is_special(run) && is_proved(run));
     let repeated = long.into_iter().filter(|_| sticks).map(|run| run.start + 1..run.end);
-    let faulty: Vec<Range<usize>> = jumped.into_iter().chain(repeated).collect();
+    let faulty: Vec<Range<usize>> = jumped.iter().cloned().chain(lost).chain(repeated).collect();
     let mut is_faulty = vec![false; rows.len()];
     faulty.iter().for_each(|run| is_faulty[run.clone()].fill(true));
     (!faulty.is_empty()).then(|| (0..rows.len()).filter(|&row| !is_faulty[row]).collect())
@@ -199,6 +203,12 @@ impl Readings {
         jumps(run.start)
             && self.are_free(run.start.saturating_sub(2)..run.start)
             && (run.end == self.value.len() || jumps(run.end) && self.are_free(run.end..run.end + 2))
+    }
+
+    /// True if the readings jump to the run and back from it.
+    fn jumps_and_returns(&self, run: &Range<usize>) -> bool {
+        let jumps = |row: usize| self.change(row).abs() > MOVES * self.typical;
+        jumps(run.start) && (run.end == self.value.len() || jumps(run.end))
     }
 
     /// True if there is noise before the run and after it, under the same voltage; if this changes before the end of the run, but after
@@ -389,6 +399,19 @@ mod tests {
             let stuck = stuck_in(&held_in(noisy(), &[[450, 470]], Some(value))).unwrap();
             assert_eq!(stuck.rows, rows_of(&[[450, 470]]));
         }
+    }
+
+    #[test]
+    fn all_losses_of_a_loose_contact_are_faults() {
+        let runs = [[450, 470], [752, 755], [903, 904], [998, 1006], [1350, 1362]];
+        let stuck = stuck_in(&held_in(noisy(), &runs, Some(-600.0))).unwrap();
+        assert_eq!(stuck.rows, rows_of(&runs));
+        // Readings that pass the value in a movement are good ones.
+        let mut record = noisy();
+        let between = 0.5 * (record.rows[611].measured.unwrap() + record.rows[613].measured.unwrap());
+        record.rows[612].measured = Some(between);
+        let held = held_in(record, &[[450, 470]], Some(between));
+        assert_eq!(stuck_in(&held).map(|stuck| stuck.rows), Some(rows_of(&[[450, 470]])));
     }
 
     #[test]
