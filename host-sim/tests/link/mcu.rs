@@ -278,11 +278,11 @@ const UNKNOWN: Reply = Reply::Refused(Reason::UnknownRequest);
 /// True if the bytes of an answer say the level of the brown-out reset.
 fn says_brown_out(bytes: &[u8]) -> bool {
     let mut receiver = Receiver::new();
-    let mut says = |&byte: &u8| {
+    let says = |&byte: &u8| {
         let packet = receiver.on_byte(byte);
         packet.is_some_and(|packet| matches!(Packet::read::<Reply>(&packet), Ok(Reply::BrownOut(_))))
     };
-    bytes.iter().any(|byte| says(byte))
+    bytes.iter().any(says)
 }
 
 /// The program of the MCU.
