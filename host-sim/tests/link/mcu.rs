@@ -394,11 +394,8 @@ impl Chip {
                 out.extend_from_slice(self.server.command_done(&self.view));
             }
             Some(Step::Send(bytes)) => {
-                let mut sent = bytes.to_vec();
-                if self.setup.is_older && says_brown_out(&sent) {
-                    sent = self.server.answered(&UNKNOWN).to_vec();
-                }
-                out.extend(sent);
+                let is_unknown = self.setup.is_older && says_brown_out(bytes);
+                out.extend_from_slice(if is_unknown { self.server.answered(&UNKNOWN) } else { bytes });
             }
             Some(Step::Isolation(_) | Step::Adaptation(_)) if self.setup.is_older => {
                 out.extend_from_slice(self.server.answered(&UNKNOWN));

@@ -10,9 +10,9 @@
 //! - begins and ends in the middle of a movement, while a voltage that never rests keeps changing as it does elsewhere.
 //!
 //! Of a sensor that sticks once, the other long runs are faults as well. So is one if the readings jump to one value and back from it by
-//! more than they ever change, while the voltage rests: a loose contact. At an end of the range, at a bound or at 0, only such jumps
-//! prove a fault, or a sensor that sticks elsewhere: a bound is kept as long as the response is beyond it, and an outlier or a shift may
-//! end that.
+//! more than they ever change, while the voltage rests: a loose contact, of which every other jump to that value and back is a fault. At
+//! an end of the range, at a bound or at 0, only such jumps prove a fault, or a sensor that sticks elsewhere: a bound is kept as long as
+//! the response is beyond it, and an outlier or a shift may end that.
 
 use std::ops::Range;
 
