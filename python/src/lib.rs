@@ -4,14 +4,14 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`error`] | the library's errors as exceptions |
-//! | [`table`] | columns as Python hands them over |
-//! | [`records`] | the options of a record, and its rows |
-//! | [`interrupt`] | computations that Ctrl-C ends |
-//! | [`link`] | a running MCU over its serial link |
-//! | [`analysis`] | identification, diagnosis, plan |
-//! | [`controller`] | the controller's tick, and the spring alone |
-//! | [`display`] | numbers as the command shows them |
+//! | `error` | the library's errors as exceptions |
+//! | `table` | columns as Python hands them over |
+//! | `records` | the options of a record, and its rows |
+//! | `interrupt` | computations that Ctrl-C ends |
+//! | `link` | a running MCU over its serial link |
+//! | `analysis` | identification, diagnosis, plan |
+//! | `controller` | the controller's tick, and the spring alone |
+//! | `display` | numbers as the command shows them |
 
 mod analysis;
 mod controller;

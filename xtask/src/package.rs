@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use xtask::{build, python, shell};
 
-/// Folder of the package, a workspace of its own.
+/// Folder of the package.
 const FOLDER: &str = "./python";
 /// The packages that its tests need, those of the fleet included.
 pub(crate) const REQUIREMENTS: &str = "python/requirements.txt";
@@ -40,7 +40,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let target = shell::target_directory()?;
     let python = python::environment(&target, "python", REQUIREMENTS)?;
     if args.only != Some(Part::Test) {
-        shell::run(shell::cargo().args(["fmt", "--manifest-path", "python/Cargo.toml", "--check"]))?;
         install(&python, &target, &args.profile)?;
     }
     if args.only != Some(Part::Install) {
@@ -52,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Installs the package in the virtual environment of an interpreter, which has maturin.
 pub(crate) fn install(python: &Path, target: &Path, profile: &str) -> Result<()> {
-    // In the same folder: what package and command depend on with the same features and profile is built once, if it is of the registry.
+    // In the same folder: what package and command depend on with the same features and profile is built once.
     let install = ["-m", "pip", "install", "--quiet", "--no-build-isolation", "--no-deps", "--force-reinstall", FOLDER];
     let path = with_first(python.parent().context("an interpreter is in a folder")?)?;
     let profile = format!("--profile {profile}");
