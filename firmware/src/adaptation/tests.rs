@@ -110,9 +110,9 @@ fn an_exchange_waits_for_a_loop_that_is_settled_and_moves_no_code() {
     assert!(exchanges > 5 && largest_v < 3.0, "{exchanges} exchanges, {largest_v} V");
 }
 
-/// A planner that is always late by one block, as a log that stalls makes it.
-#[test]
-fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
+/// A planner that is in time, or always late by one block, as a log that stalls makes it: plans that it made, and exchanges that it took
+/// for done.
+fn handed_over(in_time: bool) -> (u32, u32) {
     let settings = settings(Causes::NONE);
     let mut rig = Rig::new(&settings);
     rig.gain = 1.1;
@@ -121,13 +121,30 @@ fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
     rig.run(0, 40_000, |rig, tick, done, _| {
         if rig.isolation.ends_block(done) {
             handover.end_block(&mut rig.control, &mut rig.isolation, done, tick);
-            handover.put(late.as_ref());
+            if !in_time {
+                handover.put(late.as_ref());
+            }
             let (seen, tick) = handover.take().unwrap();
             planner.plan(&seen, tick);
-            assert_eq!(planner.report().exchanges, 0, "what runs is not what the planner takes for it");
             late = planner.next().copied();
+            if in_time {
+                handover.put(late.as_ref());
+            }
             plans += u32::from(late.is_some());
         }
     });
+    (plans, planner.report().exchanges)
+}
+
+#[test]
+fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
+    let (plans, exchanges) = handed_over(false);
     assert!(plans > 5, "{plans}");
+    assert_eq!(exchanges, 0, "what runs is not what the planner takes for it");
+}
+
+#[test]
+fn a_plan_that_comes_before_the_end_of_its_block_is_exchanged_there() {
+    let (plans, exchanges) = handed_over(true);
+    assert!(exchanges > 5 && exchanges <= plans, "{exchanges} of {plans}");
 }
