@@ -103,7 +103,7 @@ class Board:
         self.watchdog = None
         self.outside, self.output, self.read_to = None, None, 0
         self.wants_reset = self.sleeping = self.trapped = self.sprung = False
-        self.cut = None
+        self.cut = self.later = None
         self.fault = None
         self._interrupt_flash()
         self.note("reset", cause)
@@ -164,6 +164,11 @@ class Board:
         """A reset from outside."""
         self.cut = at, cause
         self.end, self.deadline = min(self.end, at), min(self.deadline, at)
+
+    def call_at(self, at, what):
+        """Calls `what` with the board, unless a reset comes before."""
+        self.later = at, what
+        self._settle()
 
     def tear(self, at):
         """From now on a double word of the flash has two wrong bits, until it is erased."""
@@ -385,6 +390,10 @@ class Board:
         self.flash.run(self.now)
         if self.systick.run(self.now):
             self.pending.add(SYSTICK_IRQ)
+        if self.later and self.now >= self.later[0]:
+            (_, what), self.later = self.later, None
+            what(self)
+            self.sleeping = False
         self._settle()
 
     def _settle(self):
@@ -394,7 +403,8 @@ class Board:
                 self.pending.add(irq)
         self._choose()
         wait = self.timer.next()
-        times = self.timer.at + wait if wait else None, self.uart.next(), self.systick.zero_at, self.watchdog
+        later = self.later and self.later[0]
+        times = self.timer.at + wait if wait else None, self.uart.next(), self.systick.zero_at, self.watchdog, later
         self.deadline = min(at for at in (self.end, *times) if at is not None)
 
     # --- Registers ---

@@ -32,7 +32,7 @@ def panic(board):
 
 
 def broken(code):
-    """Replaces the tick's first instruction."""
+    """Replaces the tick's first instruction, which is no trap any more."""
 
     def inject(board):
         board.traps.clear()
@@ -107,10 +107,12 @@ def deaf(board):
 
 
 def late(us):
-    """The tick begins in time and takes `us` microseconds longer, as one jump: the hang guard, which would count them, counts once."""
+    """The tick begins in time and takes `us` microseconds longer; what may interrupt it does."""
 
     def inject(board):
-        board.now += us * HZ // 1_000_000
+        tick = bytes(board.uc.mem_read(TICK, 2))
+        broken(HANG)(board)
+        board.call_at(board.now + us * HZ // 1_000_000, broken(tick))
 
     return inject
 

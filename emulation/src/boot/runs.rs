@@ -72,8 +72,9 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
 pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str) -> Result<String> {
     let (_, after) = injected(events)?;
     let (dying, restarted) = after.split("reset")?;
-    let (silent, _) = dying.split("log")?;
+    let (silent, logging) = dying.split("log")?;
     let (gone, _) = let_go(&silent)?;
+    logging.safe().context("while it logs")?;
     ensure!(gone <= within_us, "the voltage goes after {gone:.2} us");
     let log = dying.log(image)?;
     ensure!(log.iter().any(|said| said.contains(line)), "no `{line}` in {log:?}");
