@@ -5,10 +5,8 @@ use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
 const SAMPLE_S: f64 = 0.1;
-/// Rows of each level.
-const HELD: usize = 120;
 
-/// A spring: what follows the voltage instantaneously, what relaxes, and what precedes both.
+/// A spring: what follows the voltage instantaneously, what relaxes, and what precedes both; and how it is driven and read.
 struct Spring {
     gain: f64,
     /// Width of a play in front of the relaxation, in V.
@@ -17,12 +15,18 @@ struct Spring {
     bend: f64,
     share: f64,
     tau_s: f64,
+    /// Time constant at 500 V over that at 0 V; in between it changes geometrically.
+    quicker: f64,
     /// Part of the relaxing response with a time constant of its own, in s.
     slow: (f64, f64),
     /// Part of the response that is lost under constant voltage, with its time constant, in s.
     leaks: (f64, f64),
     /// Rows by which all is late.
     late: usize,
+    /// Step to which readings are cut off, in V; 0 for none.
+    cut_v: f64,
+    /// Rows of each level.
+    held: usize,
 }
 
 const PAPER: Spring = Spring {
@@ -31,9 +35,12 @@ const PAPER: Spring = Spring {
     bend: 0.0,
     share: 1.0 / 11.0,
     tau_s: 5.5,
+    quicker: 1.0,
     slow: (0.0, 40.0),
     leaks: (0.0, 30.0),
     late: 0,
+    cut_v: 0.0,
+    held: 120,
 };
 
 /// The report on a record of held levels with noise of 1 V.
@@ -47,20 +54,23 @@ fn report(spring: &Spring, levels: &[f64]) -> Report {
     let follow =
         |state: &mut f64, target: f64, tau_s: f64| *state += (target - *state) * -f64::exp_m1(-SAMPLE_S / tau_s);
     let mut row = |index: usize| {
-        let voltage_v = levels[index / HELD];
-        let late_v = levels[index.saturating_sub(spring.late) / HELD];
+        let voltage_v = levels[index / spring.held];
+        let late_v = levels[index.saturating_sub(spring.late) / spring.held];
         play = play.clamp(late_v - spring.width_v / 2.0, late_v + spring.width_v / 2.0);
         let input = spring.gain * play * (1.0 + spring.bend * (play.abs() / 500.0 - 1.0));
         let ((part, slow_s), (lost, leak_s)) = (spring.slow, spring.leaks);
         let whole = spring.share * input + (1.0 - spring.share) * ((1.0 - part) * lag + part * slow);
         let noise = 2.0 * (uniform() + uniform() + uniform());
-        let reading = whole - lost * leak + noise;
-        follow(&mut lag, input, spring.tau_s);
+        let mut reading = whole - lost * leak + noise;
+        if spring.cut_v > 0.0 {
+            reading = spring.cut_v * (reading / spring.cut_v).floor();
+        }
+        follow(&mut lag, input, spring.tau_s * spring.quicker.powf(late_v / 500.0));
         follow(&mut slow, input, slow_s);
         follow(&mut leak, whole, leak_s);
         Row { line: index + 2, time_s: SAMPLE_S * index as f64, voltage_v, measured: Some(reading) }
     };
-    let record = Record { name: String::new(), rows: (0..HELD * levels.len()).map(&mut row).collect() };
+    let record = Record { name: String::new(), rows: (0..spring.held * levels.len()).map(&mut row).collect() };
     diagnose(&record, &Options::default()).unwrap()
 }
 
@@ -136,4 +146,17 @@ fn one_level_shows_no_curve() {
 fn a_delay_and_a_share_are_found_together() {
     let spring = Spring { share: 0.3, late: 17, ..PAPER };
     assert_eq!(causes(&spring, &LOOPS), ["delay", "instantaneous-share"]);
+}
+
+/// What is cut off shifts all readings, which would take another cause if they were taken as rounded.
+#[test]
+fn readings_that_are_cut_off_leave_a_gain_a_gain() {
+    const LEVELS: [f64; 32] = [
+        106.0, 266.0, 126.0, 227.0, 44.0, 109.0, 500.0, 343.0, 53.0, 165.0, 159.0, 0.0, 211.0, 269.0, 419.0, 14.0,
+        201.0, 253.0, 46.0, 467.0, 213.0, 367.0, 199.0, 452.0, 1.0, 263.0, 470.0, 336.0, 127.0, 403.0, 13.0, 140.0,
+    ];
+    let spring = Spring { gain: 0.92, tau_s: 6.8, cut_v: 7.9, held: 40, ..PAPER };
+    assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "time-constant"]);
+    let spring = Spring { gain: 0.82, tau_s: 3.1, quicker: 2.3, cut_v: 9.0, held: 40, ..PAPER };
+    assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "voltage-dependent-time-constant"]);
 }

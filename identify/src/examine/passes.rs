@@ -2,8 +2,10 @@
 //!
 //! | pass | question | runs | its result is kept |
 //! | --- | --- | --- | --- |
-//! | `as_rounded` | which causes, if readings were rounded to their grid? | always | unless a later pass replaces it |
-//! | `as_cut_off` | which, if they were cut off to their grid? | on a grid, if a quick fit prefers it | if clearly likelier |
+//! | `promises_more` | were readings rounded to their grid, or cut off? | on a grid | it only chooses the next pass |
+//! | `first_as_cut_off` | which causes, if they were cut off? and the same, if rounded | if probably cut off | if clearly likelier |
+//! | `as_rounded` | which causes, if readings were rounded to their grid? | otherwise | unless a later pass replaces it |
+//! | `as_cut_off` | which, if they were cut off to their grid? | after it, if a quick fit prefers it | if clearly likelier |
 //! | `with_missing_codes` | which, if a missing code is read as one of its neighbours? | if codes are missing | if that code is always the same one |
 //! | `as_unbounded` | which, if a plateau is no bound of the sensor? | if the model does not reach beyond the bound | always |
 //! | `without_unsupported_terms` | which parts of the plant file does the spring lack? | if a search was run | if clearly likelier |
@@ -264,8 +266,8 @@ const AS_GOOD: f64 = 1.02;
 const SHARE_OF_SEARCH: f64 = 0.87;
 /// Share of the work that is left for the search on a part of the rows of a long record.
 const SHARE_OF_PART: f64 = 0.4;
-/// Share of the work that is left for the search without one part of the plant file.
-const SHARE_WITHOUT_PART: f64 = 0.15;
+/// Share of the work that is left for a search that only adds one cause after the other.
+const SHARE_OF_TRIAL: f64 = 0.15;
 
 /// One normalised record, or several of one spring, as all passes take them.
 struct ExaminedRecord<'r> {
@@ -282,19 +284,48 @@ type Progress<'p> = &'p mut dyn FnMut(&Scored);
 
 /// The passes over the readings, with one simulation.
 fn of_readings(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
-    let found = as_rounded(record, base, progress);
-    let found = as_cut_off(record, base, found, progress);
+    let rounded = Observed::new(record.data);
+    let found = match rounded.truncated().filter(|cut| promises_more(record, base, cut, &rounded, progress)) {
+        Some(cut) => first_as_cut_off(record, base, &cut, &rounded, progress),
+        None => {
+            let found = as_rounded(record, base, progress);
+            as_cut_off(record, base, found, progress)
+        }
+    };
     let found = with_missing_codes(record, base, found, progress);
     as_unbounded(record, base, found, progress)
 }
 
-/// First pass: searches with readings rounded to their grid, if they lie on one, and with plateaus at the highest and lowest
+/// True if causes that are added one after the other fit readings that were cut off clearly better than rounded ones.
+fn promises_more(record: &ExaminedRecord, base: &Base, cut: &Observed, rounded: &Observed, progress: Progress) -> bool {
+    let mut score = |observed| {
+        let nothing = WarmStart { models: Vec::new(), penalty_factor: 1.0 };
+        best_score(record, base, observed, nothing, progress).0
+    };
+    score(cut) > score(rounded) + CLEARLY_LIKELIER
+}
+
+/// Searches with readings cut off to their grid, then with the same causes and rounded readings. Taken as rounded first, readings that
+/// were cut off would take another cause for their shift.
+fn first_as_cut_off(
+    record: &ExaminedRecord,
+    base: &Base,
+    cut: &Observed,
+    rounded: &Observed,
+    progress: Progress,
+) -> Diagnosis {
+    let cut = search(record, base, cut, None, progress);
+    let rounded = search(record, base, rounded, cut.warm_start.clone(), progress);
+    if cut.score > rounded.score + CLEARLY_LIKELIER { cut } else { rounded }
+}
+
+/// Searches with readings rounded to their grid, if they lie on one, and with plateaus at the highest and lowest
 /// reading taken as bounds of the sensor.
 fn as_rounded(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
     search(record, base, &Observed::new(record.data), None, progress)
 }
 
-/// Second pass: searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.
+/// Searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.
 fn as_cut_off(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
     let may = |_: &Observed| !record.budget.is_over();
     let cut = found.observed.truncated().filter(may).filter(|cut| prefers(record, base, cut, &found));
@@ -317,7 +348,7 @@ fn likelihood(record: &ExaminedRecord, base: &Base, observed: &Observed, model: 
     engine.fit_twice(model.clone()).log_likelihood
 }
 
-/// Third pass: searches with the missing codes of a converter read as their lower or their upper neighbours, if the causes that were found
+/// Searches with the missing codes of a converter read as their lower or their upper neighbours, if the causes that were found
 /// fit one of these as well as any: a reading that may be either says less, and on one side of a code only.
 fn with_missing_codes(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
     let model = &found.extended.model;
@@ -333,7 +364,7 @@ fn with_missing_codes(record: &ExaminedRecord, base: &Base, found: Diagnosis, pr
     }
 }
 
-/// Fourth pass: searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
+/// Searches without bounds of the sensor, where the model does not go beyond the plateau that looked like one.
 fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress: Progress) -> Diagnosis {
     if record.budget.is_over() || found.confirms_bounds() {
         return found;
@@ -341,7 +372,7 @@ fn as_unbounded(record: &ExaminedRecord, base: &Base, found: Diagnosis, progress
     search(record, base, &found.observed.without_bounds(), found.warm_start, progress)
 }
 
-/// Fifth pass: removes parts of the plant file that the record does not support, then repeats the passes over the readings.
+/// Removes parts of the plant file that the record does not support, then repeats the passes over the readings.
 ///
 /// Causes are added to a simulation. A part that the spring lacks would need the opposite of a cause, which does not exist for
 /// hysteresis; combinations of other causes stand in for it. So each optional part is removed in turn, and stays removed if
@@ -384,7 +415,7 @@ fn best_score(
     progress: Progress,
 ) -> (f64, WarmStart) {
     let mut engine = Engine::within(record.data, observed, base, record.budget).limited_to(record.only);
-    record.budget.grant(SHARE_WITHOUT_PART);
+    record.budget.grant(SHARE_OF_TRIAL);
     let mut search = Search::new(&mut engine);
     let best = search.run_from(warm_start, progress);
     let found = (best.score, search.warm_start());
