@@ -164,6 +164,7 @@ Examples:
 Examples:
   cargo xtask mutants --jobs 4
   cargo xtask mutants --package model --file 'model/src/extended/*'
+  cargo xtask mutants --package model --every 20       a sample
   cargo xtask mutants --package model --iterate        only what the last run has not caught"
     )]
     Mutants(mutants::Args),

@@ -38,6 +38,9 @@ pub(crate) struct Args {
     /// Only in files that match this pattern, for example 'model/src/extended/*'
     #[arg(long, value_name = "PATTERN")]
     file: Vec<String>,
+    /// A sample: one in this many changes of each package, evenly spread over its code
+    #[arg(long, value_name = "N", conflicts_with = "iterate", value_parser = clap::value_parser!(u64).range(2..))]
+    every: Option<u64>,
     /// Number of changes that are compiled and tested at the same time
     #[arg(long, default_value_t = 1)]
     jobs: u32,
@@ -62,13 +65,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             keep(&out, true)?;
         }
         for (tests, iterate) in PASSES.into_iter().zip([args.iterate, true]) {
-            try_changes(&program, args, (name, features), tests, iterate, &out)?;
+            let Some(of) = chosen(args, iterate, &out) else { break };
+            try_changes(&program, args, (name, features), tests, iterate, &of, &out)?;
             keep(&out, iterate)?;
         }
         let outcomes = Outcomes::read(&out)?;
         println!("{package:<10} {}", outcomes.counts);
         if args.file.is_empty() {
-            Tally::now(outcomes.counts.named())?.write(&format!("mutants-{package}"))?;
+            let sample = args.every.map(|every| ("a sample: one change of so many".to_owned(), every));
+            Tally::now(outcomes.counts.named().into_iter().chain(sample))?.write(&format!("mutants-{package}"))?;
         }
         all = all.and(&outcomes.counts);
         for missed in outcomes.missed {
@@ -96,13 +101,40 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Runs the tool once. It exits with 2 or 3 when changes live, which is no failure here.
+/// Arguments of the tool for the changes that a pass tries: those of the files that are asked for, or a sample, of which the second pass
+/// tries again what the first one has missed. `None` if there is nothing to try.
+fn chosen(args: &Args, again: bool, out: &Path) -> Option<Vec<String>> {
+    let mut of: Vec<String> = args.file.iter().flat_map(|file| ["--file".to_owned(), file.clone()]).collect();
+    match args.every {
+        Some(every) if !again => {
+            of.extend(["--sharding=round-robin".to_owned(), format!("--shard=0/{every}")]);
+        }
+        Some(_) => {
+            let missed = lines(&out.join("mutants.out/missed.txt"));
+            if missed.is_empty() {
+                return None;
+            }
+            of.extend(missed.iter().map(|line| format!("--re=^{}$", escaped(line))));
+        }
+        None => {}
+    }
+    Some(of)
+}
+
+/// A regular expression that matches `text`. Escaped letters and angle brackets would have a meaning of their own.
+fn escaped(text: &str) -> String {
+    let means_something = |c| r"\.+*?()|[]{}^$".contains(c);
+    text.chars().flat_map(|c| ['\\'].into_iter().filter(move |_| means_something(c)).chain([c])).collect()
+}
+
+/// Runs the tool once for the changes `of`. It exits with 2 or 3 when changes live, which is no failure here.
 fn try_changes(
     program: &Path,
     args: &Args,
     (package, features): (&str, &str),
     tests: &[&str],
     iterate: bool,
+    of: &[String],
     out: &Path,
 ) -> Result<()> {
     let mut command = shell::command(program);
@@ -119,7 +151,7 @@ fn try_changes(
         features,
     ]);
     command.arg(format!("--jobs={}", args.jobs)).args(tests).arg("--output").arg(out);
-    args.file.iter().for_each(|file| _ = command.args(["--file", file]));
+    command.args(of);
     // The time limit follows from the tests' own time, which is measured before the first change: on a busy machine a
     // fixed one would count changes as caught that no test has noticed.
     if iterate {
@@ -273,6 +305,12 @@ mod tests {
         let line = "model/src/amplifier.rs:51:56: replace > with >= in Amplifier::limited_to";
         assert_eq!(key(line), "model/src/amplifier.rs: replace > with >= in Amplifier::limited_to");
         assert_eq!(key(&line.replace("51:56", "9:1")), key(line));
+    }
+
+    #[test]
+    fn what_a_change_is_called_matches_itself_alone() {
+        let line = "model/src/a.rs:5:9: replace f -> Option<[u8; 2]> with Some([0; 2])";
+        assert_eq!(escaped(line), r"model/src/a\.rs:5:9: replace f -> Option<\[u8; 2\]> with Some\(\[0; 2\]\)");
     }
 
     #[test]
