@@ -1,14 +1,16 @@
 //! Codes that a converter never gives: the response passes them slowly, and no reading shows them.
 //!
-//! A code `k` is missing if readings change from `k - 1` to `k + 1` or back without a change of the voltage, with nothing but these two
-//! codes one reading before and after, again and again. What it stands for is read as one of its neighbours, or as both; nothing tells
-//! which. A reading next to a missing code therefore says that the true value is in its own cell or in the missing one. The codes beyond
-//! the highest and the lowest one that are given may be missing as well.
+//! Codes are missing if readings change from the one below them to the one above or back without a change of the voltage, with nothing but
+//! these two one reading before and after, again and again. What a missing code stands for is read as the next one that is given, below or
+//! above, or as both; nothing tells which. A reading next to missing codes therefore says that the true value is in its own cell or in
+//! theirs. The codes beyond the highest and the lowest one that are given may be missing as well.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest changes across a code that prove that it is missing.
 const FEWEST_CHANGES: usize = 2;
+/// Most codes side by side that may be missing; a response passes more of them in a jump.
+const MOST_SIDE_BY_SIDE: i64 = 4;
 /// Smallest part of the readings whose neighbouring codes are both given: what is estimated without a search needs them.
 const FEWEST_KNOWN: f64 = 0.2;
 
@@ -22,30 +24,36 @@ pub(super) struct Cells {
 }
 
 /// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing, or nearly every reading is next to
-/// one. If some are, any other code between two given ones that no reading shows counts as missing, too.
+/// one. If some are, any other single code between two given ones that no reading shows counts as missing, too, and more side by side if
+/// readings change across them once.
 pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cells> {
     let first = *reading.first()?;
     let codes: Vec<i64> = reading.iter().map(|reading| ((reading - first) / step).round() as i64).collect();
     let given: BTreeSet<i64> = codes.iter().copied().collect();
-    let is_skipped = |code: i64| !given.contains(&code) && given.contains(&(code - 1)) && given.contains(&(code + 1));
-    let mut changes: BTreeMap<i64, usize> = BTreeMap::new();
+    let mut changes: BTreeMap<(i64, i64), usize> = BTreeMap::new();
     for (four, voltages) in codes.windows(4).zip(voltage_v.windows(4)) {
-        let (from, to) = (four[1], four[2]);
-        let between = (from + to) / 2;
-        let only_two = [four[0], four[3]].iter().all(|code| *code == from || *code == to);
+        let (below, above) = (four[1].min(four[2]), four[1].max(four[2]));
+        let only_two = [four[0], four[3]].iter().all(|code| *code == below || *code == above);
         let is_held = voltages.iter().all(|voltage| *voltage == voltages[0]);
-        if (to - from).abs() == 2 && only_two && is_held && is_skipped(between) {
-            *changes.entry(between).or_default() += 1;
+        let may_miss = (2..=MOST_SIDE_BY_SIDE + 1).contains(&(above - below));
+        if may_miss && only_two && is_held && given.range(below + 1..above).next().is_none() {
+            *changes.entry((below, above)).or_default() += 1;
         }
     }
     if !changes.values().any(|&count| count >= FEWEST_CHANGES) {
         return None;
     }
+    let pairs = given.iter().copied().zip(given.iter().copied().skip(1));
+    let is_gap = |gap: &(i64, i64)| gap.1 - gap.0 == 2 || gap.1 - gap.0 > 2 && changes.contains_key(gap);
+    let gaps: Vec<(i64, i64)> = pairs.filter(is_gap).collect();
+    let width = |(below, above): &(i64, i64)| above - below - 1;
+    let missing = gaps.iter().map(width).sum::<i64>() as usize;
     let (lowest, highest) = (*given.first()?, *given.last()?);
-    let half = |code: i64| if is_skipped(code) || code < lowest || code > highest { 1.5 } else { 0.5 };
-    let missing = (lowest..highest).filter(|&code| is_skipped(code)).count();
+    let beyond =
+        |end: bool, gap: Option<&(i64, i64)>| 0.5 + if end { 1.0 } else { gap.map_or(0.0, |gap| width(gap) as f64) };
     let wider = codes.iter().map(|&code| {
-        let (below, above) = (half(code - 1), half(code + 1));
+        let below = beyond(code == lowest, gaps.iter().find(|gap| gap.1 == code));
+        let above = beyond(code == highest, gaps.iter().find(|gap| gap.0 == code));
         (below + above > 1.0).then_some((-below * step, above * step))
     });
     let wider: Vec<Option<(f64, f64)>> = wider.collect();
@@ -89,10 +97,28 @@ mod tests {
     }
 
     #[test]
+    fn codes_that_are_missing_side_by_side_widen_the_cells_next_to_them() {
+        let (reading, voltage_v) =
+            readings(|code| if matches!(code.rem_euclid(6), 3 | 4) { code - code.rem_euclid(6) + 2 } else { code });
+        let Cells { missing, wider } = cells(&reading, &voltage_v, STEP).unwrap();
+        assert!((8..=12).contains(&missing), "{missing}");
+        let at =
+            |code: i64| reading.iter().position(|reading| ((reading - 3.0) / STEP).round() as i64 == code).unwrap();
+        assert_eq!([8, 11, 12].map(|code| wider[at(code)]), [Some((-4.0, 20.0)), Some((-20.0, 4.0)), None]);
+    }
+
+    #[test]
     fn no_code_is_missing_where_the_response_is_fast_or_jumps_with_the_voltage() {
         let (reading, voltage_v) = readings(|code| code);
         assert_eq!(cells(&reading, &voltage_v, STEP), None);
         let voltage_v: Vec<f64> = (0..ROWS).map(|row| [0.0, 2.0 * STEP][row / 50 % 2]).collect();
         assert_eq!(cells(&voltage_v, &voltage_v, STEP), None);
+        // Late by 5 rows: jumps while the voltage is held.
+        for jump in [2.0, 3.0, 9.0] {
+            let square =
+                |late: usize| (0..ROWS).map(move |row| [0.0, jump * STEP][(row + 50 - late) / 50 % 2]).collect();
+            let [voltage_v, reading]: [Vec<f64>; 2] = [square(0), square(5)];
+            assert_eq!(cells(&reading, &voltage_v, STEP), None);
+        }
     }
 }
