@@ -296,13 +296,15 @@ fn of_readings(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diag
     as_unbounded(record, base, found, progress)
 }
 
-/// True if causes that are added one after the other fit readings that were cut off clearly better than rounded ones.
+/// True if causes that are added one after the other fit readings that were cut off clearly better than rounded ones, which need causes.
 fn promises_more(record: &ExaminedRecord, base: &Base, cut: &Observed, rounded: &Observed, progress: Progress) -> bool {
-    let mut score = |observed| {
+    let mut trial = |observed| {
         let nothing = WarmStart { models: Vec::new(), penalty_factor: 1.0 };
-        best_score(record, base, observed, nothing, progress).0
+        let (score, found) = best_score(record, base, observed, nothing, progress);
+        (score, found.models.first().is_none_or(|best| best.blocks.is_empty()))
     };
-    score(cut) > score(rounded) + CLEARLY_LIKELIER
+    let (as_rounded, needs_no_cause) = trial(rounded);
+    !needs_no_cause && trial(cut).0 > as_rounded + CLEARLY_LIKELIER
 }
 
 /// Searches with readings cut off to their grid, then with the same causes and rounded readings. Taken as rounded first, readings that
