@@ -52,6 +52,21 @@ fn taking_over_does_not_move_the_voltage() {
     }
 }
 
+/// Without a sensor an error of the gain uses up a part of the overshoot that is allowed, on the quickest spring within the errors.
+#[test]
+fn an_error_of_the_gain_is_a_part_of_the_overshoot() {
+    let margin = Margin { time_constant: 0.05, share: 0.05, gain: 0.01, overshoot: 0.02 };
+    let robust = config(Compensation::Robust(margin), None);
+    let (share, rate) = (1.05 / 11.0, -f64::exp_m1(-1e-3 / (0.95 * 5.5)));
+    let (mut state, mut lag, mut highest) = (State::default(), 0.0, 0.0f64);
+    for _ in 0..10_000 {
+        let applied = tick(&robust, &mut state, 300.0, None).applied.to_f64();
+        highest = highest.max(1.01 * (share * applied + (1.0 - share) * lag));
+        lag += (applied - lag) * rate;
+    }
+    assert!((305.5..306.5).contains(&highest), "{highest} V");
+}
+
 /// A spring 10 % stiffer than the model, whose sensor goes silent at rest.
 #[test]
 fn a_sensor_that_falls_silent_moves_the_voltage_slowly() {

@@ -124,6 +124,55 @@ fn a_quiet_trial_is_confirmed_after_100_blocks() {
 }
 
 #[test]
+fn a_model_that_has_moved_settles_for_three_time_constants() {
+    let (mut state, mut settling) = (State::default(), 0);
+    follow(&mut state, |state| {
+        settling += u32::from(state.phase() == Phase::Settling);
+        seen(if state.parameters() == Parameters::STORED { TAU } else { Verdict::Quiet }, 0.125)
+    });
+    let seconds = f64::from(settling) * BLOCK_S;
+    assert!((seconds - 3.0 * Plant::PAPER.time_constant_s).abs() < 2.0 * BLOCK_S, "{seconds} s");
+}
+
+/// The bank begins anew if it could name an adaptable one of two causes and readings were missing, or it has tried for long.
+#[test]
+fn a_hopeless_decision_begins_anew() {
+    let of = |since, trusted_blocks, one| {
+        let report = Report::of(Verdict::Ambiguous(one, Cause::SecondRelaxation), since, 0.125, 50);
+        let seen = Observation { report, trusted_blocks, ..seen(Verdict::Quiet, 0.0) };
+        update(&mut State::default(), &seen)
+    };
+    for (since, trusted_blocks, anew) in [(399, 1000, false), (400, 1000, true), (399, 398, true), (399, 399, false)] {
+        let expected = anew.then_some(Parameters::STORED);
+        assert_eq!(of(since, trusted_blocks, Cause::TimeConstant), expected, "{since} {trusted_blocks}");
+        assert_eq!(of(since, trusted_blocks, Cause::Hysteresis), None, "{since} {trusted_blocks}");
+    }
+}
+
+/// The size of a share's error is relative to the share that runs: 0.005 of 1.1 times the share is less than half of 0.0095 of it.
+#[test]
+fn a_second_takeover_has_to_be_half_as_large_in_relation_to_what_runs() {
+    let settings = Settings { precision: 0.05, ..Settings::TYPICAL };
+    for (second, shrinks) in [(0.005, true), (0.0054, false)] {
+        let mut state = State::default();
+        let update = |state: &mut State, size, exchanged| {
+            let seen = Observation { exchanged, ..seen(Verdict::Named(Cause::InstantaneousShare), size) };
+            state.update(&settings, &seen, Plant::PAPER, RANGE_V, BLOCK_S).is_some()
+        };
+        let mut exchanged = false;
+        for _ in 0..1000 {
+            if state.phase() != Phase::Trial {
+                exchanged = update(&mut state, 0.0095, exchanged);
+            }
+        }
+        assert!((state.parameters().share - 1.1045).abs() < 1e-4, "{:?}", state.parameters());
+        update(&mut state, second, exchanged);
+        update(&mut state, second, false);
+        assert_eq!(state.phase(), if shrinks { Phase::Moving } else { Phase::Returning }, "{second}");
+    }
+}
+
+#[test]
 fn a_named_cause_moves_its_parameter_slowly_and_is_confirmed_when_the_bank_is_quiet() {
     let mut state = State::default();
     let mut moves = 0;

@@ -50,6 +50,20 @@ fn the_step_gain_is_the_response_of_the_spring_that_runs() {
 }
 
 #[test]
+fn another_share_changes_the_weights_but_not_the_settled_value() {
+    LAGS.times((1.5, 1.2), |changed| {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(near(changed.share, 0.24), "{changed:?}");
+        for (changed, expected) in changed.time_constants_s.iter().zip([0.075, 0.6]) {
+            assert!(near(*changed, expected), "{changed}");
+        }
+        for (changed, expected) in changed.weights.iter().zip([0.475, 0.285]) {
+            assert!(near(*changed, expected), "{changed}");
+        }
+    });
+}
+
+#[test]
 fn memory_and_law_multiply_the_step_gain_by_their_slopes() {
     let memory = Some(Memory { direct: 0.5, thresholds_v: &[10.0], weights: &[1.5] });
     let law = Some(Law { voltage_v: &[0.0, 100.0, 200.0], stiffness: &[0.0, 50.0, 350.0] });

@@ -298,3 +298,33 @@ fn counters_at_their_ends_stay_there() {
     config.assess(&mut state);
     assert_eq!((state.age, state.since_decision), (u32::MAX, u32::MAX));
 }
+
+#[test]
+fn readings_are_pinned_below_the_model_by_more_than_three_deviations() {
+    let config = config(1000.0);
+    for (residual, pinned) in [(config.pinned_below, false), (config.pinned_below - 1, true)] {
+        let mut state = State::NEW;
+        state.tests.highest = config.restart;
+        (state.means.pinned, state.means.residual) = (true, residual);
+        config.assess(&mut state);
+        assert_eq!(state.pinned, pinned, "{residual}");
+    }
+}
+
+/// Of 100 blocks that leave `excess` more than their noise, and of which a cause explains 100.
+#[test]
+fn an_interval_grows_with_what_the_cause_leaves() {
+    let mut grow = 0;
+    for cause in Cause::ALL {
+        let square = |excess: i64| {
+            let of = Report::of(Verdict::Named(cause), 100, 0.125, 0);
+            let energies = ((200 + excess) << 20, (100 + excess) << 20);
+            let finding = Report { energies, ..of }.finding(&Settings::PAPER, 1000.0).unwrap();
+            finding.half_width * finding.half_width
+        };
+        let [more, twice] = [50, 100].map(|excess| square(excess) - square(0));
+        assert!((twice - 2.0 * more).abs() <= 1e-9 * twice.abs(), "{cause:?}: {more} {twice}");
+        grow += u32::from(more > 0.0);
+    }
+    assert!(grow > 5, "{grow}");
+}
