@@ -83,7 +83,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
                 || self.evaluator.is_over()
             {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
-                let best = self.repriced(best, &mut progress);
+                let best = self.repriced(&best, &mut progress);
                 return self.with_rare_forms(best, &mut progress);
             }
             self.extended.clear();
@@ -128,7 +128,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
         // On all rows of a long record they would take much memory.
         self.keeps_first_fits = false;
         self.evaluated.penalty_factor = penalty_factor;
-        self.root();
+        let root = self.root();
         for (place, model) in models.into_iter().enumerate() {
             if place > 0 && self.evaluator.is_over() {
                 break;
@@ -136,9 +136,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
             self.evaluated.evaluate(self.evaluator, model);
         }
         // All rows may show autocorrelation that a part of them, far apart, could not.
-        let penalty_factor = penalty_factor.max(self.evaluator.penalty_factor(&self.best().fit));
+        let penalty_factor = penalty_factor.max(self.evaluator.penalty_factor(&self.best_or(&root).fit));
         self.evaluated.reprice(self.evaluator, penalty_factor);
-        let best = self.best();
+        let best = self.best_or(&root);
         progress(&best);
         let best = self.extended_greedily(best, &mut progress);
         if self.evaluator.is_over() || !self.evaluator.doubts(&best.fit) {
@@ -151,9 +151,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// The best structure after all were priced with the same noise floor; extended further unless it is the one found before.
-    fn repriced(&mut self, found: Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
+    fn repriced(&mut self, found: &Scored, progress: &mut impl FnMut(&Scored)) -> Scored {
         self.evaluated.reprice(self.evaluator, self.evaluated.penalty_factor);
-        let best = self.best();
+        let best = self.best_or(found);
         if best.fit.model.structure() == found.fit.model.structure() {
             return best;
         }
@@ -203,10 +203,9 @@ impl<'e, E: Evaluator> Search<'e, E> {
         self.evaluated.evaluate_from(self.evaluator, scored.fit.model.without(effect))
     }
 
-    /// The best structure that was evaluated.
-    fn best(&self) -> Scored {
-        let ranked = self.ranked();
-        (*ranked.first().expect("the search starts from no effect at all")).clone()
+    /// The best structure that was evaluated; `other` if none has a finite score.
+    fn best_or(&self, other: &Scored) -> Scored {
+        (*self.ranked().first().unwrap_or(&other)).clone()
     }
 
     /// The best structure of each set of effects, the best set first.
