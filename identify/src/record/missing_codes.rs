@@ -25,7 +25,7 @@ pub(super) struct Cells {
 
 /// Returns the cells of readings that are multiples of `step` apart; `None` if no code is missing, or nearly every reading is next to
 /// one. If some are, any other single code between two given ones that no reading shows counts as missing, too, and more side by side if
-/// readings change across them once.
+/// readings change across them once and the next codes are given.
 pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cells> {
     let first = *reading.first()?;
     let codes: Vec<i64> = reading.iter().map(|reading| ((reading - first) / step).round() as i64).collect();
@@ -40,12 +40,18 @@ pub(super) fn cells(reading: &[f64], voltage_v: &[f64], step: f64) -> Option<Cel
             *changes.entry((below, above)).or_default() += 1;
         }
     }
-    if !changes.values().any(|&count| count >= FEWEST_CHANGES) {
+    let pairs: Vec<(i64, i64)> = given.iter().copied().zip(given.iter().copied().skip(1)).collect();
+    let is_wide = |pair: &(i64, i64)| pair.1 - pair.0 > 2;
+    // One after the other they are the steps of a coarser range.
+    let is_alone =
+        |at: usize| ![at.wrapping_sub(1), at + 1].iter().any(|&beside| pairs.get(beside).is_some_and(is_wide));
+    let is_gap = |&(at, gap): &(usize, &(i64, i64))| {
+        gap.1 - gap.0 == 2 || is_wide(gap) && changes.contains_key(gap) && is_alone(at)
+    };
+    let gaps: Vec<(i64, i64)> = pairs.iter().enumerate().filter(is_gap).map(|(_, gap)| *gap).collect();
+    if !gaps.iter().any(|gap| changes.get(gap).is_some_and(|&count| count >= FEWEST_CHANGES)) {
         return None;
     }
-    let pairs = given.iter().copied().zip(given.iter().copied().skip(1));
-    let is_gap = |gap: &(i64, i64)| gap.1 - gap.0 == 2 || gap.1 - gap.0 > 2 && changes.contains_key(gap);
-    let gaps: Vec<(i64, i64)> = pairs.filter(is_gap).collect();
     let width = |(below, above): &(i64, i64)| above - below - 1;
     let missing = gaps.iter().map(width).sum::<i64>() as usize;
     let (lowest, highest) = (*given.first()?, *given.last()?);
@@ -105,6 +111,16 @@ mod tests {
         let at =
             |code: i64| reading.iter().position(|reading| ((reading - 3.0) / STEP).round() as i64 == code).unwrap();
         assert_eq!([8, 11, 12].map(|code| wider[at(code)]), [Some((-4.0, 20.0)), Some((-20.0, 4.0)), None]);
+    }
+
+    #[test]
+    fn the_codes_that_a_coarser_range_leaves_out_are_not_missing() {
+        let coarser = |code: i64| if code < 20 { code } else { (code as f64 / 4.0).round() as i64 * 4 };
+        let (reading, voltage_v) = readings(coarser);
+        assert_eq!(cells(&reading, &voltage_v, STEP), None);
+        // With a code that is missing in the finer range, that one alone.
+        let (reading, voltage_v) = readings(|code| if code == 9 { 8 } else { coarser(code) });
+        assert_eq!(cells(&reading, &voltage_v, STEP).map(|cells| cells.missing), Some(1));
     }
 
     #[test]
