@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let outcomes = Outcomes::read(&out)?;
         println!("{package:<10} {}", outcomes.counts);
         if args.file.is_empty() {
-            let sample = args.every.map(|every| ("a sample: one change of so many".to_owned(), every));
+            let sample = args.every.map(|every| ("one in this many changes was tried".to_owned(), every));
             Tally::now(outcomes.counts.named().into_iter().chain(sample))?.write(&format!("mutants-{package}"))?;
         }
         all = all.and(&outcomes.counts);
