@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
     }
     println!("{:<10} {all}", "in all");
-    if args.package.is_empty() && args.file.is_empty() {
+    if args.package.is_empty() && args.file.is_empty() && args.every.is_none() {
         for key in listed.keys().filter(|key| !living.contains(*key)) {
             println!("caught by now, to be deleted from {SURVIVORS}: {key}");
         }

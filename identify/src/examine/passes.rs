@@ -3,7 +3,7 @@
 //! | pass | question | runs | its result is kept |
 //! | --- | --- | --- | --- |
 //! | `promises_more` | were readings rounded to their grid, or cut off? | on a grid | it only chooses the next pass |
-//! | `first_as_cut_off` | which causes, if they were cut off? and the same, if rounded | if probably cut off | if clearly likelier |
+//! | `first_as_cut_off` | which causes, if they were cut off to it? | if they probably were | if clearly likelier than rounded with these causes |
 //! | `as_rounded` | which causes, if readings were rounded to their grid? | otherwise | unless a later pass replaces it |
 //! | `as_cut_off` | which, if they were cut off to their grid? | after it, if a quick fit prefers it | if clearly likelier |
 //! | `with_missing_codes` | which, if a missing code is read as one of its neighbours? | if codes are missing | if that code is always the same one |
@@ -288,7 +288,7 @@ fn of_readings(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diag
     let found = match rounded.truncated().filter(|cut| promises_more(record, base, cut, &rounded, progress)) {
         Some(cut) => first_as_cut_off(record, base, &cut, &rounded, progress),
         None => {
-            let found = as_rounded(record, base, progress);
+            let found = as_rounded(record, base, &rounded, progress);
             as_cut_off(record, base, found, progress)
         }
     };
@@ -323,8 +323,8 @@ fn first_as_cut_off(
 
 /// Searches with readings rounded to their grid, if they lie on one, and with plateaus at the highest and lowest
 /// reading taken as bounds of the sensor.
-fn as_rounded(record: &ExaminedRecord, base: &Base, progress: Progress) -> Diagnosis {
-    search(record, base, &Observed::new(record.data), None, progress)
+fn as_rounded(record: &ExaminedRecord, base: &Base, rounded: &Observed, progress: Progress) -> Diagnosis {
+    search(record, base, rounded, None, progress)
 }
 
 /// Searches with readings cut off to their grid, which the readings alone cannot distinguish from rounding.

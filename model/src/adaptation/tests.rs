@@ -111,26 +111,27 @@ fn bounds_are_as_far_away_as_the_settings_say() {
     assert_eq!(settings.bounds(), (low, high));
 }
 
+/// Follows a named time constant until the quiet bank confirms it. Returns the blocks in `phase` and the state at the end.
+fn taken_over(phase: Phase) -> (u32, State) {
+    let (mut state, mut blocks) = (State::default(), 0);
+    follow(&mut state, |state| {
+        blocks += u32::from(state.phase() == phase);
+        seen(if state.parameters() == Parameters::STORED { TAU } else { Verdict::Quiet }, 0.125)
+    });
+    (blocks, state)
+}
+
 /// A round of 20 blocks to the first decision of the bank, three that have to agree, and one more.
 #[test]
 fn a_quiet_trial_is_confirmed_after_100_blocks() {
-    let (mut state, mut trial) = (State::default(), 0);
-    follow(&mut state, |state| {
-        trial += u32::from(state.phase() == Phase::Trial);
-        seen(if state.parameters() == Parameters::STORED { TAU } else { Verdict::Quiet }, 0.125)
-    });
+    let (trial, state) = taken_over(Phase::Trial);
     // With the one in which the bank begins anew.
     assert_eq!((trial, state.phase()), (101, Phase::Watching));
 }
 
 #[test]
 fn a_model_that_has_moved_settles_for_three_time_constants() {
-    let (mut state, mut settling) = (State::default(), 0);
-    follow(&mut state, |state| {
-        settling += u32::from(state.phase() == Phase::Settling);
-        seen(if state.parameters() == Parameters::STORED { TAU } else { Verdict::Quiet }, 0.125)
-    });
-    let seconds = f64::from(settling) * BLOCK_S;
+    let seconds = f64::from(taken_over(Phase::Settling).0) * BLOCK_S;
     assert!((seconds - 3.0 * Plant::PAPER.time_constant_s).abs() < 2.0 * BLOCK_S, "{seconds} s");
 }
 
@@ -174,13 +175,7 @@ fn a_second_takeover_has_to_be_half_as_large_in_relation_to_what_runs() {
 
 #[test]
 fn a_named_cause_moves_its_parameter_slowly_and_is_confirmed_when_the_bank_is_quiet() {
-    let mut state = State::default();
-    let mut moves = 0;
-    follow(&mut state, |state| {
-        let named = state.parameters() == Parameters::STORED;
-        moves += u32::from(state.phase() == Phase::Moving);
-        seen(if named { TAU } else { Verdict::Quiet }, 0.125)
-    });
+    let (moves, state) = taken_over(Phase::Moving);
     let wanted = libm::exp(0.125);
     assert!((state.parameters().time_constant - wanted).abs() < 1e-12);
     assert_eq!((state.parameters().share, state.parameters().gain), (1.0, 1.0));
