@@ -65,3 +65,38 @@ fn with_first(folder: &Path) -> Result<std::ffi::OsString> {
     let path = env::var_os("PATH").unwrap_or_default();
     Ok(env::join_paths([folder.to_owned()].into_iter().chain(env::split_paths(&path)))?)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use xtask::shell;
+
+    /// Features of each crate that a build of `packages` takes, by name and version.
+    fn features(packages: &[&str], edges: &str) -> BTreeMap<String, BTreeSet<String>> {
+        let tree = ["tree", "--prefix", "none", "--format", "{p}|{f}", "--edges", edges];
+        let printed = shell::run_and_read(shell::cargo().args(tree).args(packages)).unwrap();
+        let mut features = BTreeMap::<_, BTreeSet<_>>::new();
+        for line in printed.lines().filter(|line| !line.is_empty()) {
+            let (name, of) = line.trim_end_matches(" (*)").split_once('|').unwrap();
+            features.entry(name.to_owned()).or_default().insert(of.to_owned());
+        }
+        features
+    }
+
+    /// One feature of one macro made cargo build every package of the workspace a second time.
+    #[test]
+    fn the_package_shares_what_the_other_members_have_built() {
+        let others = features(&["--workspace", "--exclude=vsj-python"], "normal,build,dev");
+        let package = features(&["--package=vsj-python"], "normal,build");
+        let mut shared = 0;
+        for (name, wanted) in &package {
+            let Some(built) = others.get(name) else { continue };
+            shared += 1;
+            for of in wanted {
+                assert!(built.contains(of), "{name}: the package wants [{of}], the other members {built:?}");
+            }
+        }
+        assert!(shared > 20, "{shared} crates in common");
+    }
+}
