@@ -33,7 +33,7 @@ mod voltage_history;
 
 pub use check::{Candidate, Check, Inadequacy, UnmodelledDynamics};
 pub(crate) use gain_and_time_constant::{gain_and_time_constant, model_of_both};
-pub(crate) use spikes::{far_off, spikes};
+pub(crate) use spikes::{far_off, spikes, without_outliers};
 pub use unidentifiable::Unidentifiable;
 
 use crate::fit::engine::{Engine, Fit};

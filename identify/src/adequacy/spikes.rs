@@ -16,6 +16,7 @@ use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
 use crate::record::changes::{changes, follow};
 use crate::record::data::Data;
+use crate::record::observed::Observed;
 use crate::stats::median::median;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::{FAR_OFF_SCALES, ROWS_AFTER_CHANGE, SHARE_AFTER_CHANGES, SHARE_IN_RUNS};
@@ -99,6 +100,16 @@ fn count_of_steps(far: &[bool], errors: &[f64], sigma: f64) -> Option<usize> {
         }
     }
     (steps > spikes && steps >= FEWEST_STEPS).then_some(steps)
+}
+
+/// What is known of the readings without the outliers of a fit, which are no error of a simulation; far readings that follow the command
+/// or come in runs are one.
+pub(crate) fn without_outliers(engine: &Engine, fit: &Fit) -> Observed {
+    if fit.noise.outliers.is_none() || spikes(engine, fit).is_some() {
+        return engine.observed.clone();
+    }
+    let errors = engine.observed.errors(&fit.residual);
+    engine.observed.ignoring(&far_off(&fit.noise, &fit.noise.innovations(&errors)))
 }
 
 /// For each row, true if the reading is far off by its innovation, beyond what rounding makes of it.

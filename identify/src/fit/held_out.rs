@@ -19,6 +19,7 @@ use crate::effects::model::{Block, Model};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::normal_equations::{Jacobian, bounded_step, normal_equations};
 use crate::noise::Term;
+use crate::record::observed::Observed;
 use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::LEAST_INFORMATION;
 
@@ -81,22 +82,22 @@ impl Engine<'_> {
         unseen
     }
 
-    /// Returns the errors of the rows from `rows` on, in V, by a fit to the rows before; searched coordinates stay, and a reading at a
-    /// bound counts only where the prediction is within it.
-    pub fn extrapolation_residual(&mut self, fit: &Fit, rows: usize) -> Vec<f64> {
+    /// Returns the errors of the rows from `rows` on, in V, by a fit to the rows before; searched coordinates stay, and a reading counts
+    /// as far as `judged` knows it: at a bound only where the prediction is within it.
+    pub fn extrapolation_residual(&mut self, fit: &Fit, judged: &Observed, rows: usize) -> Vec<f64> {
         let mut before = fit.clone();
         for _ in 0..EXTRAPOLATION_STEPS {
             let model = FullFit::new(self, &before).refitted(self, |row| row < rows);
             let residual = self.residual(&model);
             // A step that the rows before do not confirm is beyond the linearisation.
-            let error = |residual: &[f64]| root_mean_square(&self.observed.errors(residual)[..rows]);
+            let error = |residual: &[f64]| root_mean_square(&judged.errors(residual)[..rows]);
             let is_better = error(&residual) <= error(&before.residual);
             if !is_better || model == before.model {
                 break;
             }
             before = Fit { model, residual, ..before };
         }
-        self.observed.errors(&before.residual)[rows..].to_vec()
+        judged.errors(&before.residual)[rows..].to_vec()
     }
 }
 
@@ -234,7 +235,7 @@ mod tests {
         let observed = Observed::new(&data);
         let mut engine = Engine::new(&data, &observed, &base);
         let [with, without] = [of("gain-error", vec![1.0]), Model::default()].map(|model| engine.fit_twice(model));
-        let [with, without] = [with, without].map(|fit| engine.extrapolation_residual(&fit, rows));
+        let [with, without] = [with, without].map(|fit| engine.extrapolation_residual(&fit, engine.observed, rows));
         assert_eq!((with.len(), without.len()), (ROWS - rows, ROWS - rows));
         // With a gain of 1.1 the prediction is 1000 V too high, and by up to 50 V less without it.
         let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len() as f64;

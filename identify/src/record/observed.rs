@@ -33,6 +33,9 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// The reading says nothing of the true value.
+    const ANYTHING: Self = Self::Within(f64::NEG_INFINITY, f64::INFINITY);
+
     /// True for a reading that is known up to an interval.
     fn is_interval(&self) -> bool {
         matches!(self, Self::Within(..) | Self::Unreported(_))
@@ -162,6 +165,12 @@ impl Observed {
         let stops = all.kinds.iter().any(|kind| matches!(kind, Kind::AtLeast | Kind::AtMost));
         let bounded = if stops { self } else { self.without_bounds() };
         Self { truncation_v: all.truncation_v, ..bounded }
+    }
+
+    /// Returns the same with nothing known of the readings for which `ignored` is true.
+    pub fn ignoring(&self, ignored: &[bool]) -> Self {
+        let kind = |(kind, ignored): (&Kind, &bool)| if *ignored { Kind::ANYTHING } else { *kind };
+        Self { kinds: self.kinds.iter().zip(ignored).map(kind).collect(), ..self.clone() }
     }
 
     /// Returns the step of the grid, in V, if it is at least `times` the scale of the noise.

@@ -11,7 +11,7 @@
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
 //! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and
-//! that is left but for outliers. A wrong form follows a law in part: where no structure is left that shows, it can have removed no more
+//! that is left; the errors of other findings leave outliers out. A wrong form follows a law in part: where no structure is left that shows, it can have removed no more
 //! than [`undetected`] times what is left, or times `left / removed` as much if less than is left was removed. Where another finding is
 //! likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
@@ -66,9 +66,7 @@ pub(crate) fn with_unknown_laws(findings: &mut [Finding], power: f64, undetected
     };
     let own = |(index, finding): (usize, &Finding)| {
         let form = if APART.contains(&finding.cause) { 0.0 } else { UNKNOWN_FORM.get() * largest_but(index) };
-        // Outliers take no part in what a law may leave.
-        let outliers = findings.iter().position(|other| other.cause == "outliers").filter(|other| *other != index);
-        let left = (finding.rmse_after.powi(2) - outliers.map_or(0.0, |outliers| removed[outliers])).max(0.0);
+        let left = finding.rmse_after.powi(2);
         // What removes less than is left is nearer to what any form of a law leaves; not the product of an infinity and 0.
         let most = if left > 0.0 { undetected * left * (left / removed[index]).max(1.0) } else { f64::INFINITY };
         let unknown = form.min(most) + UNKNOWN_NOISE.get() * left;
@@ -258,17 +256,13 @@ mod tests {
 
     #[test]
     fn outliers_leave_other_causes_as_likely_as_they_are_without() {
-        let alone = {
-            let mut findings = [finding("time-constant", 1.5)];
-            with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
+        let likely = |findings: &mut [Finding]| {
+            with_unknown_laws(findings, f64::MAX, f64::INFINITY);
             findings[0].probability
         };
-        // The mean square error of the outliers is a part of what the time constant leaves.
-        let beside = Finding { rmse_before: 401.25f64.sqrt(), rmse_after: 20.0, ..finding("time-constant", 1.5) };
-        let mut findings = [beside, finding("outliers", 20.0)];
-        with_unknown_laws(&mut findings, f64::MAX, f64::INFINITY);
-        let probability = findings[0].probability;
-        assert!((probability - alone).abs() < 0.01 && alone > 0.9, "{probability} {alone}");
+        let alone = likely(&mut [finding("time-constant", 1.5)]);
+        let beside = likely(&mut [finding("time-constant", 1.5), finding("outliers", 20.0)]);
+        assert!((beside - alone).abs() < 0.01 && alone > 0.9, "{beside} {alone}");
     }
 
     #[test]

@@ -53,6 +53,8 @@ pub struct Diagnosis {
     pub(crate) zero_offsets: Vec<f64>,
     /// How each reading was taken: exact, at a bound or known up to an interval, on a quantisation grid, cut off.
     pub(crate) observed: Observed,
+    /// The same without the outliers of `extended`.
+    pub(crate) regular: Observed,
     /// Readings less predictions of `extended` on held-out segments with searched places known, in the reading's unit.
     pub(crate) held_out_in_place: Vec<f64>,
     /// Held-out log-likelihood of the extended simulation less the price of its causes, in nats.
@@ -103,7 +105,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let extended = &found.best.fit;
     let mut held_out = [&baseline, extended].map(|fit| engine.held_out_residual(fit));
     let known = [(&baseline, &*held_out[0]), (extended, &*held_out[1])];
-    let ranking = ranking(engine, &found.contenders, &found.causes, known);
+    let ranking = ranking(engine, &found, known);
     // The simulation as it is given does not include what the readings cut off.
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;
@@ -133,7 +135,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
-        credibility::in_unexplained(&mut findings, share * after.rmse.powi(2));
+        credibility::in_unexplained(&mut findings, share * found.regular.rms(&extended.residual).powi(2));
     }
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alone = credibility::likely_alone(&findings).filter(|alone| !found.rivals.contains(alone));
@@ -152,7 +154,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     };
     let (suspects, sets): (Vec<_>, Vec<_>) = match verdict {
         Verdict::Explained => Default::default(),
-        _ => suspects(engine, &found.best, mem::take(&mut found.explored), may_be_suspect).into_iter().unzip(),
+        _ => suspects(engine, &found.best, &found.regular, mem::take(&mut found.explored), may_be_suspect)
+            .into_iter()
+            .unzip(),
     };
     let gain = if findings.is_empty() { 0.0 } else { 1.0 - after.held_out_rmse / before.held_out_rmse.max(1e-12) };
     let reading_map = engine.reading_map(found.model());
@@ -208,6 +212,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         equation: None,
         zero_offsets: engine.zero_offsets(&found.best.fit),
         observed: observed.clone(),
+        regular: found.regular,
         held_out_in_place,
         score: found.best.score,
         base: engine.base().clone(),
@@ -226,8 +231,7 @@ pub(crate) fn power(reading: &[f64]) -> f64 {
 /// All findings, the one that explains the largest mean square error first.
 fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
     let (data, observed, fit) = (engine.data, engine.observed, &found.best.fit);
-    let mut findings: Vec<Finding> =
-        found.causes.iter().map(|cause| finding(engine, &found.best, &found.explored, cause)).collect();
+    let mut findings: Vec<Finding> = found.causes.iter().map(|cause| finding(engine, found, cause)).collect();
     let isolated = adequacy::spikes(engine, fit).is_none();
     findings.extend(reading_findings(data, observed, fit, isolated));
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
@@ -330,6 +334,7 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         equation: None,
         zero_offsets: vec![0.0; data.rows_of_records().len()],
         observed: engine.observed.clone(),
+        regular: engine.observed.clone(),
         base: engine.base().clone(),
         contenders: Vec::new(),
         unexplained_v: 0.0,

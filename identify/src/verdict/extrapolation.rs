@@ -29,7 +29,7 @@ pub(crate) fn spoiling(engine: &mut Engine, found: &Found) -> Vec<Spoils> {
         return Vec::new();
     }
     let rows = (FIRST_PART * engine.data.rows() as f64).round() as usize;
-    let mut rest = |fit: &Fit| engine.extrapolation_residual(fit, rows);
+    let mut rest = |fit: &Fit| engine.extrapolation_residual(fit, &found.regular, rows);
     let with = rest(&found.best.fit);
     let others = found.causes.iter().map(|cause| (EFFECTS[cause.effect].cause(), rest(&cause.left_out.fit)));
     others

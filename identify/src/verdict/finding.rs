@@ -4,9 +4,9 @@ use crate::answer::{Finding, Parameter};
 use crate::dimension::Dimension;
 use crate::effects::EFFECTS;
 use crate::fit::engine::Engine;
-use crate::search::{Explored, Scored};
 use crate::verdict::cause::Cause;
 use crate::verdict::form_average::parameters_over_forms;
+use crate::verdict::found::Found;
 use crate::verdict::ranking::named;
 
 /// Largest odds that are converted to a probability, in nats.
@@ -18,14 +18,14 @@ pub(crate) fn explained(finding: &Finding) -> f64 {
 }
 
 /// Reports an effect of the best structure.
-pub(crate) fn finding(engine: &mut Engine, best: &Scored, explored: &Explored, cause: &Cause) -> Finding {
+pub(crate) fn finding(engine: &mut Engine, found: &Found, cause: &Cause) -> Finding {
     let Cause { effect, without, left_out } = cause;
+    let Found { best, explored, regular, .. } = found;
     let effect = *effect;
     let odds = best.score - without.score;
-    let (data, observed) = (engine.data, engine.observed);
-    let [before, rival, after] = [left_out, without, best].map(|scored| observed.rms(&scored.fit.residual));
+    let [before, rival, after] = [left_out, without, best].map(|scored| regular.rms(&scored.fit.residual));
     let others = named(&without.fit.model);
-    let rival = data.scales().shown_in_four_digits(Dimension::ReadingSize, rival);
+    let rival = engine.data.scales().shown_in_four_digits(Dimension::ReadingSize, rival);
     let against = if others.is_empty() { "the simulation as it is given".to_owned() } else { others };
     let better = if best.fit.model.searched(effect) {
         format!("with the price of all searched places deducted, the readings are {odds:.1} nats likelier")

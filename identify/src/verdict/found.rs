@@ -3,6 +3,7 @@
 use crate::adequacy::{self, Candidate, Unidentifiable, When};
 use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
+use crate::record::observed::Observed;
 use crate::search::{Explored, Scored, Search, WarmStart, effects};
 use crate::stats::thresholds::empirical::LARGEST_ERROR_RATIO;
 use crate::verdict::alternatives::rivals;
@@ -21,6 +22,8 @@ pub(crate) struct Found {
     pub(crate) causes: Vec<Cause>,
     /// Sets of causes that the record cannot reject.
     pub(crate) rivals: Vec<Vec<&'static str>>,
+    /// What is known of the readings without the outliers of the best structure.
+    pub(crate) regular: Observed,
     /// Structures to rank, the best first.
     pub(crate) contenders: Vec<Scored>,
     /// From which a search under another reading of the same rows starts.
@@ -43,14 +46,14 @@ pub(crate) fn search(
     if let Some(reason) = adequacy::unidentifiable(engine, &unsearched, When::BeforeSearch) {
         return Err(reason);
     }
-    let observed = engine.observed;
     let mut search = Search::new(engine);
     let mut best = match warm_start {
         None => search.run(progress),
         Some(warm_start) => search.run_from(warm_start, progress),
     };
     search.evaluator().budget().close();
-    let error = |residual: &[f64]| observed.rms(residual);
+    let regular = adequacy::without_outliers(search.evaluator(), &best.fit);
+    let error = |residual: &[f64]| regular.rms(residual);
     let most = LARGEST_ERROR_RATIO.get() * error(&baseline.residual);
     let is_larger = |fit: &Fit| error(&fit.residual) > most;
     let held_out = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual(fit));
@@ -87,7 +90,16 @@ pub(crate) fn search(
     let contenders = ranking::contenders(&search, &causes);
     // Last: what the causes are compared with keeps all lags.
     best.fit = with_fewer_lags(search.evaluator(), best.fit, held_out);
-    Ok(Found { causes, rivals, contenders, warm_start: search.warm_start(), best, explored: search.into_explored() })
+    let regular = adequacy::without_outliers(search.evaluator(), &best.fit);
+    Ok(Found {
+        causes,
+        regular,
+        rivals,
+        contenders,
+        warm_start: search.warm_start(),
+        best,
+        explored: search.into_explored(),
+    })
 }
 
 impl Found {

@@ -29,9 +29,9 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
     if !judged || ours.len() != theirs.len() || ours.len() < SEGMENTS {
         return;
     }
-    // A reading at a bound of the sensor, or known up to an interval, says little about either.
+    // A reading at a bound of the sensor, or known up to an interval, says little about either, and an outlier nothing.
     let exact = |errors: &[f64]| -> Vec<f64> {
-        let rows = errors.iter().zip(&diagnosis.observed.kinds);
+        let rows = errors.iter().zip(&diagnosis.regular.kinds);
         rows.map(|(error, kind)| if *kind == Kind::Exact { *error } else { 0.0 }).collect()
     };
     let [ours, theirs] = [ours, theirs].map(|errors| exact(errors));

@@ -9,6 +9,7 @@ use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::search::{Evaluator, Scored, Search, effects};
 use crate::verdict::cause::Cause;
+use crate::verdict::found::Found;
 
 /// A set of causes in its best forms, with its score and errors.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,9 +23,9 @@ pub struct RankedCauses {
     pub values: String,
     /// Held-out log-likelihood less the price of the blocks, in nats.
     pub score: f64,
-    /// Root mean square error on the rows that it was fitted to, in the reading's unit.
+    /// Root mean square error on the rows that it was fitted to, in the reading's unit; outliers are left out.
     pub rmse: f64,
-    /// Root mean square error on held-out segments, in the reading's unit.
+    /// Root mean square error on held-out segments, in the reading's unit; outliers are left out.
     pub held_out_rmse: f64,
 }
 
@@ -45,18 +46,14 @@ fn is_same(a: &Scored, b: &Scored) -> bool {
     a.fit.model.structure() == b.fit.model.structure()
 }
 
-/// Ranks the contenders of a search that found `causes`. `known` holds fits whose residual on held-out segments was computed before.
-pub(crate) fn ranking(
-    engine: &mut Engine,
-    contenders: &[Scored],
-    causes: &[Cause],
-    known: [(&Fit, &[f64]); 2],
-) -> Vec<RankedCauses> {
-    let (data, observed, base) = (engine.data, engine.observed, engine.base());
+/// Ranks the contenders of a search. `known` holds fits whose residual on held-out segments was computed before.
+pub(crate) fn ranking(engine: &mut Engine, found: &Found, known: [(&Fit, &[f64]); 2]) -> Vec<RankedCauses> {
+    let (data, base) = (engine.data, engine.base());
+    let Found { contenders, causes, regular, .. } = found;
     let mut ranked = |scored: &Scored| {
         let held_out_rmse = match known.iter().find(|(other, _)| other.model == scored.fit.model) {
-            Some((_, held_out)) => observed.rms(held_out),
-            None => observed.rms(&engine.held_out_residual(&scored.fit)),
+            Some((_, held_out)) => regular.rms(held_out),
+            None => regular.rms(&engine.held_out_residual(&scored.fit)),
         };
         let without = causes.iter().filter(|cause| is_same(&cause.without, scored));
         RankedCauses {
@@ -64,7 +61,7 @@ pub(crate) fn ranking(
             best_without: without.map(|cause| EFFECTS[cause.effect].cause()).collect(),
             values: values(data, base, &scored.fit.model),
             score: scored.score,
-            rmse: observed.rms(&scored.fit.residual),
+            rmse: regular.rms(&scored.fit.residual),
             held_out_rmse,
         }
     };

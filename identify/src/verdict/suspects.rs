@@ -14,6 +14,7 @@ use crate::answer::{Judge, Suspect};
 use crate::effects::{EFFECTS, contains};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval::parameters;
+use crate::record::observed::Observed;
 use crate::search::{Explored, Scored, Search, effects};
 use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
@@ -23,11 +24,12 @@ const MOST_SUSPECTS: usize = 5;
 const SHARE_OF_FITS: f64 = 0.4;
 
 /// The suspects beside the findings of the set `best`, the closest first, each with its set: causes whose 95 % interval excludes
-/// that they have no effect. Sets that the search has evaluated are used; the best set extended by each other effect is fitted
+/// that they have no effect. Their errors are those of the `regular` readings. Sets that the search has evaluated are used; the best set extended by each other effect is fitted
 /// once, as far as the work allows. `may` says which causes are considered.
 pub(crate) fn suspects(
     engine: &mut Engine,
     best: &Scored,
+    regular: &Observed,
     explored: Explored,
     may: impl Fn(&'static str) -> bool,
 ) -> Vec<(Suspect, Scored)> {
@@ -50,20 +52,28 @@ pub(crate) fn suspects(
         if suspects.len() == MOST_SUSPECTS || budget.is_over() {
             break;
         }
-        suspects.extend(suspect(&mut search, best, effect, &set).map(|suspect| (suspect, set)));
+        suspects.extend(suspect(&mut search, best, regular, effect, &set).map(|suspect| (suspect, set)));
     }
     suspects
 }
 
 /// Reports an effect as a suspect in a set of causes; `None` if it explains too little.
-fn suspect(search: &mut Search<Engine>, best: &Scored, effect: usize, set: &Scored) -> Option<Suspect> {
+fn suspect(
+    search: &mut Search<Engine>,
+    best: &Scored,
+    regular: &Observed,
+    effect: usize,
+    set: &Scored,
+) -> Option<Suspect> {
     let without = search.left_out(set, effect);
     if !is_seen(&without.fit, &set.fit) {
         return None;
     }
     let engine = search.evaluator();
     let informs = engine.held_out_informs(&set.fit, effect);
-    let [rmse_before, rmse_after] = [&without, set].map(|scored| error(engine, &scored.fit, informs));
+    // Of held-out segments or of single readings.
+    let residual = if informs { Engine::held_out_residual } else { Engine::leave_one_out_residual };
+    let [rmse_before, rmse_after] = [&without, set].map(|scored| regular.rms(&residual(engine, &scored.fit)));
     let others = effects(&set.fit.model).into_iter().filter(|other| *other != effect);
     Some(Suspect {
         cause: EFFECTS[effect].cause(),
@@ -82,10 +92,4 @@ fn suspect(search: &mut Search<Engine>, best: &Scored, effect: usize, set: &Scor
 fn is_seen(without: &Fit, with: &Fit) -> bool {
     let gain = with.log_likelihood - without.log_likelihood;
     gain.max(with.white_noise_log_likelihood - without.white_noise_log_likelihood) > NATS_WITHIN_INTERVAL
-}
-
-/// Root mean square error of a fit in V, of held-out segments or of single readings.
-fn error(engine: &mut Engine, fit: &Fit, of_segments: bool) -> f64 {
-    let residual = if of_segments { engine.held_out_residual(fit) } else { engine.leave_one_out_residual(fit) };
-    engine.observed.rms(&residual)
 }
