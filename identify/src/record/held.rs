@@ -5,9 +5,9 @@
 //! that repeat but do not return were held. They say nothing new, so that a record is diagnosed without them; only if a sensor reports
 //! changes, a reading that it did not report says that the response was near the last one.
 //!
-//! What holds them shows in the number of rows from one new reading to the next: readings that are lost at random leave numbers that
-//! are independent of each other, a sensor that reports changes leaves few rows while the response changes and many while it rests. Such
-//! a sensor also reports changes of nearly one size after very different times.
+//! What holds them shows in the number of rows from one new reading to the next: readings that are lost leave numbers that are independent
+//! of the response, a sensor that reports changes leaves few rows while the response changes and many while it rests. Such a sensor also
+//! reports changes of nearly one size after very different times.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -17,6 +17,7 @@ use simulation::record::Record;
 use crate::record::quantisation_grid::QuantisationGrid;
 use crate::record::stuck::{FEWEST_NEW, ROUNDING, TURNING, range, stuck};
 use crate::stats::median::{median, robust_deviation};
+use crate::stats::rank::rank_correlation;
 use crate::stats::thresholds::empirical::{COARSEST_GRID_OF_HELD, FEWEST_TIES, LEAST_HELD, MOST_RETURNS};
 use crate::stats::thresholds::probability::Z_RARE;
 
@@ -200,9 +201,9 @@ fn changes(new: &[f64]) -> Vec<f64> {
 
 /// Returns why readings were held, from all of them as row, time and value, the rows of the new ones, and the sizes of their changes.
 ///
-/// The numbers of rows from one new reading to the next depend on the response if they are correlated with the next ones beyond chance;
-/// they are clipped, so that a few long rests do not hide that. They also do if all changes are nearly of one size, while their rates
-/// are not.
+/// The number of rows to the next new reading depends on the response if it is smaller after a larger change, beyond chance. It also does
+/// if no change is small, and either successive numbers are correlated beyond chance, or all changes are nearly of one size while their
+/// rates are not. Successive numbers of a link that is bad for a while are correlated as well.
 fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason {
     // Equal ones are readings at a bound or of a spring at rest.
     let changed = new.windows(2).filter(|pair| rows[pair[0]].2 != rows[pair[1]].2);
@@ -215,17 +216,18 @@ fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason 
         let middle = median(&mut of.to_vec()).unwrap_or(0.0);
         robust_deviation(of.iter().map(|value| value - middle)).unwrap_or(0.0)
     };
-    let least = changes[(SMALLEST * changes.len() as f64) as usize];
-    let of_one_size = least > THRESHOLD * changes[changes.len() / 2] && spread(&sizes) < SAME_SIZE * spread(&rates);
+    let none_is_small = changes[(SMALLEST * changes.len() as f64) as usize] > THRESHOLD * changes[changes.len() / 2];
+    let of_one_size = spread(&sizes) < SAME_SIZE * spread(&rates);
+    // A few long rests do not hide that the others are alike.
     let most = 4.0 * median(&mut lengths.to_vec()).unwrap_or(1.0);
     let clipped: Vec<f64> = lengths.iter().map(|length| length.min(most)).collect();
     let mean = clipped.iter().sum::<f64>() / clipped.len() as f64;
     let variance: f64 = clipped.iter().map(|length| (length - mean).powi(2)).sum();
-    let product: f64 = clipped.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum();
-    let rows = clipped.len() as f64;
-    if variance < (CLOCK * mean).powi(2) * rows {
+    let after =
+        |values: &[f64]| rank_correlation(&values[..values.len().saturating_sub(1)], clipped.get(1..).unwrap_or(&[]));
+    if variance < (CLOCK * mean).powi(2) * clipped.len() as f64 {
         Reason::SlowClock
-    } else if of_one_size || product / variance * rows.sqrt() > Z_RARE {
+    } else if -after(&sizes) > Z_RARE || none_is_small && (of_one_size || after(&clipped) > Z_RARE) {
         Reason::ReportsChanges
     } else {
         Reason::Lost
@@ -302,6 +304,34 @@ mod tests {
             let change = sent.reported_change().unwrap();
             assert!((least..1.2 * least).contains(&change), "{sent:?}");
         }
+    }
+
+    /// The response hardly rests, so that one number of rows says little of the next, and changes are of many sizes.
+    #[test]
+    fn reports_of_a_response_that_hardly_rests_are_no_lost_readings() {
+        let (mut state, mut before, mut random, mut voltage_v) = (0.0, 0.0, 1u32, 0.0);
+        let row = |(row, noise): (usize, f64)| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            if row % 2 == 0 {
+                voltage_v = f64::from(random >> 30) * 100.0;
+            }
+            state += (voltage_v - state) / 5.0;
+            let new: f64 = state + noise;
+            before = if (new - before).abs() < 10.0 { before } else { new };
+            Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(before) }
+        };
+        let rows = normals(ROWS).into_iter().enumerate().map(row).collect();
+        assert_eq!(held(&Record { name: String::new(), rows }).unwrap().reason, Reason::ReportsChanges);
+    }
+
+    #[test]
+    fn readings_of_a_link_that_is_bad_for_a_while_are_no_reports_of_changes() {
+        let count = std::cell::Cell::new(0);
+        let all = record(|before, new, random| {
+            count.set(count.get() + 1);
+            if random < if count.get() % 100 < 30 { 0.8 } else { 0.2 } { before } else { new }
+        });
+        assert_eq!(held(&all).unwrap().reason, Reason::Lost);
     }
 
     #[test]

@@ -11,6 +11,7 @@
 pub(crate) mod coloured;
 pub mod median;
 pub mod periodogram;
+pub(crate) mod rank;
 pub mod scale;
 pub(crate) mod segments;
 pub(crate) mod shifted_run;
