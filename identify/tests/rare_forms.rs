@@ -273,18 +273,19 @@ fn missing_codes_of_a_converter_are_no_law_of_the_spring() {
 
 #[test]
 fn a_sensor_that_reports_changes_is_no_delay_and_no_law_of_the_spring() {
-    const LEAST_V: f64 = 12.0;
-    let mut last = f64::INFINITY;
-    let report = diagnosed(
-        ideal,
-        |_| TAU_S,
-        |_, response, noise| {
-            let new = response + noise;
-            if (new - last).abs() >= LEAST_V {
-                last = new;
-            }
-            last
-        },
-    );
-    assert!((LEAST_V..1.1 * LEAST_V).contains(&step_of_converter(&report)));
+    for least_v in [12.0, 25.0, 40.0] {
+        let mut last = f64::INFINITY;
+        let report = diagnosed(
+            ideal,
+            |_| TAU_S,
+            |_, response, noise| {
+                let new = response + noise;
+                if (new - last).abs() >= least_v {
+                    last = new;
+                }
+                last
+            },
+        );
+        assert!((least_v..1.1 * least_v).contains(&step_of_converter(&report)), "{least_v}");
+    }
 }

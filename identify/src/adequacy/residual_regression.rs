@@ -67,8 +67,8 @@ fn dependence(engine: &mut Engine, fit: &Fit) -> Option<UnmodelledDynamics> {
     let gain = explained(&everything, &target) - before;
     let total: f64 = target.iter().map(|value| value * value).sum();
     let mut variance = (total - before - gain) / (data.rows() - everything.len()) as f64;
-    if fit.noise.half_step > 0.0 {
-        // Only rounded rows near an edge of their cell are informative; the others lower the mean.
+    if fit.noise.half_step > 0.0 || engine.observed.intervals() > 0 {
+        // Of readings that are known up to an interval only those near an end of it are informative; the others lower the mean.
         variance = variance.max(1.0);
     }
     let most = groups.iter().max_by(|a, b| {
