@@ -320,13 +320,14 @@ fn extensions(
 fn rare(mut found: Vec<Extension>) -> Vec<Extension> {
     let by_gain = |a: &Extension, b: &Extension| b.predicted_gain.total_cmp(&a.predicted_gain);
     found.sort_by(by_gain);
+    let best = found.first().map_or(0.0, |it| it.predicted_gain);
+    // Before any is left out for want of room: what promises next to nothing needs none.
+    found.retain(|it| it.predicted_gain > PART_OF_BEST * best);
     let mut seen = HashSet::new();
     let (mut kept, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|it| seen.insert(it.block.effect));
     kept.extend(others);
     kept.truncate(RARE_FORMS_FITTED);
     kept.sort_by(by_gain);
-    let best = kept.first().map_or(0.0, |it| it.predicted_gain);
-    kept.retain(|it| it.predicted_gain > PART_OF_BEST * best);
     kept
 }
 
@@ -477,6 +478,6 @@ mod tests {
         found.extend([of(7, 2, 60.0), of(8, 1, 5.0)]);
         let kept: Vec<(usize, usize)> = rare(found).iter().map(|it| (it.block.effect, it.block.form)).collect();
         // That of the third effect promises less than a tenth.
-        assert_eq!(kept, [(3, 5), (3, 4), (3, 3), (3, 2), (7, 2)]);
+        assert_eq!(kept, [(3, 5), (3, 4), (3, 3), (3, 2), (3, 1), (7, 2)]);
     }
 }
