@@ -33,6 +33,8 @@ const ADDED_BY_DECADES: usize = 5;
 const LEAST_SEEN: f64 = 0.3;
 /// Largest creep that is added within the record's duration, relative to the nominal response.
 const MOST_ADDED: f64 = 3.0;
+/// Smallest time constant of a creep that is added, relative to the response's, that is no gain error.
+const LEAST_APART: f64 = 1.5;
 /// Largest ratio of the parts of two decades.
 const STEEPEST: f64 = 5.0;
 
@@ -79,6 +81,11 @@ impl Effect for SecondRelaxation {
     /// What is added also changes the settled value.
     fn affects(&self, form: usize) -> Affects {
         if matches!(form, ADDED | ADDED_BY_DECADES) { Affects::StaticResponse } else { Affects::Relaxation }
+    }
+
+    /// Creep that is added with about the time constant of the response changes its gain.
+    fn is_another_cause(&self, form: usize, point: &[f64], _: &Data) -> bool {
+        form == ADDED && point[1].exp() < LEAST_APART * REFERENCE_TIME_CONSTANT_S
     }
 
     fn forms(&self) -> usize {
@@ -151,5 +158,23 @@ impl Effect for SecondRelaxation {
             _ => lags(&[(1.0, slow_s), (1.0, tau_s * tau_s / slow_s)]),
         };
         chain.relaxation.add_lags(&lags, matches!(form, OF_THE_REST | SPREAD));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    /// Beside a hysteresis of another form, creep of 1.26 time constants was named instead of a gain error.
+    #[test]
+    fn creep_that_is_added_with_the_time_constant_of_the_response_is_a_gain_error() {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 0.0, measured: Some(0.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..200).map(row).collect() }, Input::Hold);
+        let is_gain = |form: usize, times: f64| {
+            SecondRelaxation.is_another_cause(form, &[0.2, (times * REFERENCE_TIME_CONSTANT_S).ln()], &data)
+        };
+        assert!(is_gain(ADDED, 1.26) && !is_gain(ADDED, 1.6) && !is_gain(OF_EVERYTHING, 1.26));
     }
 }
