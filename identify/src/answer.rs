@@ -214,9 +214,9 @@ pub struct Finding {
     /// Its parameters with their names, in the order of the cause's page in the manual.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
-    /// Root mean square error of the best fit without the cause, in the reading's unit.
+    /// Root mean square error of the best fit without the cause, in the reading's unit; outliers are left out, but for their own finding.
     pub rmse_before: f64,
-    /// Root mean square error with the cause, in the reading's unit.
+    /// Root mean square error with the cause, in the reading's unit, of the same readings; of their own finding without outliers.
     pub rmse_after: f64,
     /// The evidence, in one sentence.
     pub evidence: String,
