@@ -22,7 +22,7 @@ const LANES: Lanes = Lanes {
     // The longest step by far, and on one core most of the time: it begins as soon as it can.
     host: &[
         // The same random cases in every run, so that it judges the change alone; `cargo test` by itself draws new ones.
-        Step::new("test", &["test", "--workspace"]).with("PROPTEST_RNG_SEED", "1"),
+        Step::new("test", &["test", "--workspace", WITHOUT_PYTHON]).with("PROPTEST_RNG_SEED", "1"),
     ],
     beside: &[
         Step::new("lint nucleo", &lint("-pfirmware", "nucleo-g474re")),
@@ -72,10 +72,12 @@ const LONG: &[Step] = &[
     Step::emulation("boot all", &["boot", "--all"]),
 ];
 
-/// Without the Python package: for an interpreter `package` would build its bindings again.
+/// The Python package has no tests in Rust, and for an interpreter `package` would build its bindings again.
+const WITHOUT_PYTHON: &str = "--exclude=vsj-python";
+
 #[rustfmt::skip]
 const BUILD: [&str; 8] =
-    ["build", "--quiet", "--workspace", "--exclude=vsj-python", "--lib", "--bins", "--tests", "--examples"];
+    ["build", "--quiet", "--workspace", WITHOUT_PYTHON, "--lib", "--bins", "--tests", "--examples"];
 
 #[rustfmt::skip]
 const fn lint(package: &'static str, features: &'static str) -> [&'static str; 13] {
