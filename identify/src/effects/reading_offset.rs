@@ -290,7 +290,7 @@ mod tests {
     fn starts(rows: usize) -> Vec<Vec<f64>> {
         let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 0.0, measured: Some(0.0) };
         let data = Data::new(&Record { name: String::new(), rows: (0..ROWS).map(row).collect() }, Input::Hold);
-        let step = |(row, noise): (usize, f64)| noise + if row / rows % 2 == 0 { 0.0 } else { 20.0 };
+        let step = |(row, noise): (usize, f64)| noise + if (row / rows).is_multiple_of(2) { 0.0 } else { 20.0 };
         let residual: Vec<f64> = normals(ROWS).into_iter().enumerate().map(step).collect();
         let points = ReadingOffset.initial_points(LEVELS, &FitContext { data: &data, residual: &residual, sigma: 1.0 });
         assert!(points.iter().all(|point| !ReadingOffset.is_another_cause(LEVELS, point, &data)));

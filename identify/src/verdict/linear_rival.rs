@@ -16,6 +16,8 @@ use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 
+/// Largest error of a reading by the linear model, relative to that by the simulation, with which an outlier of this is none of that.
+const CLOSER: f64 = 0.5;
 /// Coefficients of the cubic.
 const COEFFICIENTS: usize = 4;
 
@@ -29,12 +31,11 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
     if !judged || ours.len() != theirs.len() || ours.len() < SEGMENTS {
         return;
     }
-    // A reading at a bound of the sensor, or known up to an interval, says little about either, and an outlier nothing.
-    let exact = |errors: &[f64]| -> Vec<f64> {
-        let rows = errors.iter().zip(&diagnosis.regular.kinds);
-        rows.map(|(error, kind)| if *kind == Kind::Exact { *error } else { 0.0 }).collect()
-    };
-    let [ours, theirs] = [ours, theirs].map(|errors| exact(errors));
+    let kinds = diagnosis.observed.kinds.iter().zip(&diagnosis.regular.kinds);
+    let pairs = kinds.zip(ours.iter().zip(theirs)).map(|((observed, regular), (ours, theirs))| {
+        if judges(*observed, *regular, *ours, *theirs) { (*ours, *theirs) } else { (0.0, 0.0) }
+    });
+    let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs.unzip();
     let [ours_less, theirs_less] = [&ours, &theirs].map(|errors| without_cubic(errors, &diagnosis.data.time_s));
     let finest = diagnosis.data.scales().restored(Dimension::ReadingSize, FINEST_V.get());
     if root_mean_square(&ours) <= finest || !is_worse(&ours_less, &theirs_less, WORSE_THAN_LINEAR.get()) {
@@ -55,6 +56,13 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
         shown(&theirs),
         shown(&ours)
     ));
+}
+
+/// True if a reading, known as `observed` and, where outliers say nothing, as `regular`, judges between the errors of both models. At a
+/// bound of the sensor, or known up to an interval, it says little about either; an outlier says nothing, unless the linear model comes
+/// much closer to it: then it is none.
+fn judges(observed: Kind, regular: Kind, ours: f64, theirs: f64) -> bool {
+    observed == Kind::Exact && (regular == Kind::Exact || theirs.abs() < CLOSER * ours.abs())
 }
 
 /// Errors less their best cubic of the time.
@@ -88,6 +96,14 @@ mod tests {
         let ours: Vec<f64> = (0..ROWS).map(|row| times * noise[row] + swing(row)).collect();
         let [ours, theirs] = [&ours, &noise[ROWS..].to_vec()].map(|errors| without_cubic(errors, &time_s()));
         is_worse(&ours, &theirs, WORSE_THAN_LINEAR.get())
+    }
+
+    #[test]
+    fn an_outlier_judges_only_if_the_linear_model_predicts_it() {
+        let ignored = Kind::Within(f64::NEG_INFINITY, f64::INFINITY);
+        let outlier = |theirs: f64| judges(Kind::Exact, ignored, 30.0, theirs);
+        assert!(outlier(1.0) && !outlier(29.0) && !outlier(-40.0));
+        assert!(judges(Kind::Exact, Kind::Exact, 30.0, 29.0) && !judges(Kind::AtLeast, Kind::AtLeast, 30.0, 1.0));
     }
 
     #[test]
