@@ -11,8 +11,8 @@
 //! with the mean square errors that the finding alone removes, that the largest other finding removes (0 for a hum and outliers,
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
 //! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and
-//! that is left; the errors of other findings leave outliers out. A wrong form follows a law in part: where no structure is left that shows, it can have removed no more
-//! than [`undetected`] times what is left, or times `left / removed` as much if less than is left was removed. Where another finding is
+//! that is left; the errors of other findings leave outliers out. A wrong form follows a law in part: where no structure is left that
+//! shows, it can have removed no more than [`undetected`] times what is left, or times `left / removed` as much if less than is left was removed. Where another finding is
 //! likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text

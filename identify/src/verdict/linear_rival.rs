@@ -16,7 +16,7 @@ use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 
-/// Largest error of a reading by the linear model, relative to that by the simulation, with which an outlier of this is none of that.
+/// Error of a reading by the linear model, relative to that by the simulation, below which the reading is no outlier.
 const CLOSER: f64 = 0.5;
 /// Coefficients of the cubic.
 const COEFFICIENTS: usize = 4;
@@ -59,8 +59,8 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
 }
 
 /// True if a reading, known as `observed` and, where outliers say nothing, as `regular`, judges between the errors of both models. At a
-/// bound of the sensor, or known up to an interval, it says little about either; an outlier says nothing, unless the linear model comes
-/// much closer to it: then it is none.
+/// bound of the sensor, or known up to an interval, it says little about either; an outlier says nothing, unless the linear model predicts
+/// it much better.
 fn judges(observed: Kind, regular: Kind, ours: f64, theirs: f64) -> bool {
     observed == Kind::Exact && (regular == Kind::Exact || theirs.abs() < CLOSER * ours.abs())
 }

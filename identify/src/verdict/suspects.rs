@@ -24,8 +24,8 @@ const MOST_SUSPECTS: usize = 5;
 const SHARE_OF_FITS: f64 = 0.4;
 
 /// The suspects beside the findings of the set `best`, the closest first, each with its set: causes whose 95 % interval excludes
-/// that they have no effect. Their errors are those of the `regular` readings. Sets that the search has evaluated are used; the best set extended by each other effect is fitted
-/// once, as far as the work allows. `may` says which causes are considered.
+/// that they have no effect. Their errors are those of the `regular` readings. Sets that the search has evaluated are used; the best set
+/// extended by each other effect is fitted once, as far as the work allows. `may` says which causes are considered.
 pub(crate) fn suspects(
     engine: &mut Engine,
     best: &Scored,
