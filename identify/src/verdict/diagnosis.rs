@@ -105,7 +105,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let extended = &found.best.fit;
     let mut held_out = [&baseline, extended].map(|fit| engine.held_out_residual(fit));
     let known = [(&baseline, &*held_out[0]), (extended, &*held_out[1])];
-    let ranking = ranking(engine, &found, known);
+    let ranking = ranking(engine, &found.contenders, &found.causes, &found.regular, known);
     // The simulation as it is given does not include what the readings cut off.
     for left in baseline.residual.iter_mut().chain(&mut held_out[0]) {
         *left -= observed.truncation_v;

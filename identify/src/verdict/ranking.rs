@@ -7,9 +7,9 @@ use crate::effects::model::Model;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
+use crate::record::observed::Observed;
 use crate::search::{Evaluator, Scored, Search, effects};
 use crate::verdict::cause::Cause;
-use crate::verdict::found::Found;
 
 /// A set of causes in its best forms, with its score and errors.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,10 +46,16 @@ fn is_same(a: &Scored, b: &Scored) -> bool {
     a.fit.model.structure() == b.fit.model.structure()
 }
 
-/// Ranks the contenders of a search. `known` holds fits whose residual on held-out segments was computed before.
-pub(crate) fn ranking(engine: &mut Engine, found: &Found, known: [(&Fit, &[f64]); 2]) -> Vec<RankedCauses> {
+/// Ranks the contenders of a search that found `causes`, by their errors of the `regular` readings. `known` holds fits whose residual on
+/// held-out segments was computed before.
+pub(crate) fn ranking(
+    engine: &mut Engine,
+    contenders: &[Scored],
+    causes: &[Cause],
+    regular: &Observed,
+    known: [(&Fit, &[f64]); 2],
+) -> Vec<RankedCauses> {
     let (data, base) = (engine.data, engine.base());
-    let Found { contenders, causes, regular, .. } = found;
     let mut ranked = |scored: &Scored| {
         let held_out_rmse = match known.iter().find(|(other, _)| other.model == scored.fit.model) {
             Some((_, held_out)) => regular.rms(held_out),
