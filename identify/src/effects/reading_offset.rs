@@ -155,8 +155,7 @@ impl Effect for ReadingOffset {
             RUN => best_runs(context).into_iter().flatten().collect(),
             LEVELS => {
                 let found = stretches(context.residual, MOST_STRETCHES);
-                let is_shift = (FEWEST_STRETCHES..MOST_STRETCHES).contains(&found.len());
-                let several = is_shift.then(|| levels(context.data.rows(), &found));
+                let several = (found.len() >= FEWEST_STRETCHES).then(|| levels(context.data.rows(), &found));
                 several.into_iter().collect()
             }
             DECAY | RAMPS => passing(form, context).into_iter().collect(),
@@ -202,11 +201,6 @@ impl Effect for ReadingOffset {
             DECAY | RAMPS => run,
             _ => 0.0,
         }
-    }
-
-    /// An error that steps again and again is not the sensor's zero, which was knocked a few times, but a law that nobody has found.
-    fn is_another_cause(&self, form: usize, point: &[f64], data: &Data) -> bool {
-        form == LEVELS && stretches_of(point, data.rows()).count() == MOST_STRETCHES
     }
 
     fn searched(&self, form: usize) -> bool {
@@ -274,32 +268,5 @@ impl Effect for ReadingOffset {
                 _ => offset,
             };
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::record::input::Input;
-    use crate::stats::scale::normals;
-    use simulation::record::{Record, Row};
-
-    const ROWS: usize = 2000;
-
-    /// Points of the form with levels for errors that step to and fro every `rows` rows.
-    fn starts(rows: usize) -> Vec<Vec<f64>> {
-        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 0.0, measured: Some(0.0) };
-        let data = Data::new(&Record { name: String::new(), rows: (0..ROWS).map(row).collect() }, Input::Hold);
-        let step = |(row, noise): (usize, f64)| noise + if (row / rows).is_multiple_of(2) { 0.0 } else { 20.0 };
-        let residual: Vec<f64> = normals(ROWS).into_iter().enumerate().map(step).collect();
-        let points = ReadingOffset.initial_points(LEVELS, &FitContext { data: &data, residual: &residual, sigma: 1.0 });
-        assert!(points.iter().all(|point| !ReadingOffset.is_another_cause(LEVELS, point, &data)));
-        points
-    }
-
-    #[test]
-    fn errors_that_step_again_and_again_are_no_shift_of_the_zero() {
-        assert_eq!(starts(300).len(), 1);
-        assert!(starts(80).is_empty());
     }
 }

@@ -113,6 +113,15 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
     findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
 }
 
+/// Returns true if readings are shifted to as many levels as are looked for, and lowers that probability: so many follow any law that no
+/// cause describes, while a sensor is knocked a few times.
+pub(crate) fn of_levels_without_end(findings: &mut [Finding]) -> bool {
+    let is_endless =
+        |finding: &&mut Finding| finding.parameters.iter().any(|(name, it)| name == "levels" && it.at_bound);
+    let endless = findings.iter_mut().find(is_endless);
+    endless.map(|finding| lower(finding, IF_SPOILING.get())).is_some()
+}
+
 /// True if there are causes, not proved by exact equality of readings, and each is less likely true than untrue.
 pub(crate) fn are_unlikely(findings: &[Finding]) -> bool {
     findings.iter().any(|finding| !finding.proved) && !findings.iter().any(is_likely_cause)
@@ -186,6 +195,7 @@ fn lower(finding: &mut Finding, factor: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::answer::Parameter;
     use crate::record::data::Data;
     use crate::record::input::Input;
     use crate::record::observed::Kind;
@@ -282,6 +292,21 @@ mod tests {
         assert_eq!(likely_alone(&findings), None, "nothing is left open");
         assert!(are_linear(&findings[1..]) && are_linear(&[probable("hysteresis", 0.3), probable("delay", 0.01)]));
         assert!(!are_linear(&[]) && !are_linear(&[probable("hysteresis", 0.3)]));
+    }
+
+    #[test]
+    fn a_shift_to_as_many_levels_as_are_looked_for_explains_nothing() {
+        let shifted = |at_bound| {
+            let (value, dimension) = (16.0, crate::dimension::Dimension::Ratio);
+            let unit = String::new();
+            let levels =
+                Parameter { value, low: value, high: value, unit, at_bound, extrapolated_from_v: None, dimension };
+            Finding { parameters: vec![("levels".to_owned(), levels)], ..probable("reading-offset", 0.97) }
+        };
+        let mut findings = [probable("drift", 0.9), shifted(true)];
+        assert!(of_levels_without_end(&mut findings) && probabilities(&findings) == [0.9, 0.97 * IF_SPOILING.get()]);
+        let mut findings = [probable("drift", 0.9), shifted(false)];
+        assert!(!of_levels_without_end(&mut findings) && probabilities(&findings) == [0.9, 0.97]);
     }
 
     fn probable(cause: &'static str, probability: f64) -> Finding {

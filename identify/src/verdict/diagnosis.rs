@@ -133,6 +133,8 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let lacking = data.normalisation.identified && credibility::are_linear(&findings);
     let unexplained = structured || !spoiling.is_empty() || unfinished || unearned || lacking;
     credibility::of_spoiling(&mut findings, &spoiling);
+    let endless = credibility::of_levels_without_end(&mut findings);
+    let unexplained = unexplained || endless;
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
         credibility::in_unexplained(&mut findings, share * found.regular.rms(&extended.residual).powi(2));
@@ -193,6 +195,7 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
             None if unfinished => Some(UNFINISHED.to_owned()),
             None if unearned => Some(UNEARNED.to_owned()),
             None if lacking => Some(LACKING.to_owned()),
+            None if endless => Some(ENDLESS.to_owned()),
             None => left(),
         },
         noise: noise_report(&extended.noise),
@@ -272,6 +275,10 @@ const UNEARNED: &str =
 
 /// The report's sentence on linear dynamics that an identified spring lacks.
 const LACKING: &str = "Further linear dynamics explain part of the error, but the nominal spring was identified from these readings: they are part of it, or take the place of a cause that no model describes";
+
+/// The report's sentence on readings that are shifted to more levels than are looked for.
+const ENDLESS: &str =
+    "The error steps more often than a shift of the readings does: it may follow a law that no cause describes";
 
 /// The report's sentence on unmodelled dynamics.
 fn sentence(found: &UnmodelledDynamics, extended: &Fit, scales: &Scales) -> String {
