@@ -289,3 +289,15 @@ fn a_sensor_that_reports_changes_is_no_delay_and_no_law_of_the_spring() {
         assert!((least_v..1.1 * least_v).contains(&step_of_converter(&report)), "{least_v}");
     }
 }
+
+/// The code of a failed reading is a hundred times the error that the limit removes.
+#[test]
+fn a_limit_of_the_amplifier_beside_the_code_of_failed_readings_is_found() {
+    let read = |row: usize, response: f64, noise: f64| if row % 33 == 7 { 1e4 } else { response + noise };
+    let report = diagnosed(|voltage_v, _| voltage_v.min(430.0), |_| TAU_S, read);
+    let mut causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    assert_eq!((report.verdict, causes), (Verdict::Explained, vec!["amplifier-limit", "outliers"]), "{report:#?}");
+    let errors = report.findings.iter().map(|finding| finding.rmse_after);
+    assert!(errors.into_iter().all(|error| error < 1.1), "{:?}", report.findings);
+}

@@ -12,8 +12,8 @@
 //! which do not respond to the voltage and correct no law; nor do these count, or findings that exact equality of readings proves, as
 //! the largest; nor does more than the mean square of the readings, since a gain that is far off removes more than any law leaves), and
 //! that is left; the errors of other findings leave outliers out. A wrong form follows a law in part: where no structure is left that
-//! shows, it can have removed no more than [`undetected`] times what is left, or times `left / removed` as much if less than is left was removed. Where another finding is
-//! likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
+//! shows, it can have removed no more than [`undetected`] times what is left, or times `left / removed` as much if less than is left was
+//! removed. Where another finding is likely to be such a correction, some law is unknown, as in a record whose verdict is `unexplained`. There
 //!
 //! ```text
 //! probability *= IF_UNEXPLAINED removed / (removed + structure)           structure: mean square of what is left beyond noise
@@ -118,8 +118,9 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
 pub(crate) fn of_levels_without_end(findings: &mut [Finding]) -> bool {
     let is_endless =
         |finding: &&mut Finding| finding.parameters.iter().any(|(name, it)| name == "levels" && it.at_bound);
-    let endless = findings.iter_mut().find(is_endless);
-    endless.map(|finding| lower(finding, IF_SPOILING.get())).is_some()
+    let Some(endless) = findings.iter_mut().find(is_endless) else { return false };
+    lower(endless, IF_SPOILING.get());
+    true
 }
 
 /// True if there are causes, not proved by exact equality of readings, and each is less likely true than untrue.

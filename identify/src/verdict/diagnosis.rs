@@ -131,10 +131,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         credibility::of_identified(&mut findings);
     }
     let lacking = data.normalisation.identified && credibility::are_linear(&findings);
-    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned || lacking;
-    credibility::of_spoiling(&mut findings, &spoiling);
     let endless = credibility::of_levels_without_end(&mut findings);
-    let unexplained = unexplained || endless;
+    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned || lacking || endless;
+    credibility::of_spoiling(&mut findings, &spoiling);
     if unexplained {
         let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
         credibility::in_unexplained(&mut findings, share * found.regular.rms(&extended.residual).powi(2));
