@@ -118,6 +118,11 @@ impl Unit {
         let known = PREFIXES.iter().find(|(_, prefix, _)| name.strip_suffix('V') == Some(prefix));
         Self::of(&name, known.map_or(1.0, |&(si, ..)| si))
     }
+
+    /// True for a unit of voltage; false for any other unit of a command.
+    pub fn is_voltage(&self) -> bool {
+        usual_volts(&self.name).is_some()
+    }
 }
 
 /// The names of [`Units`] as the table `[units]` of a plant file; an absent name is that of the default.
@@ -174,6 +179,7 @@ mod tests {
         assert_eq!(UnitNames::from(&units), names);
         assert_eq!(UnitNames::default().units().unwrap(), Units::default());
         assert_eq!(Unit::of_voltage("%").si, 1.0);
+        assert_eq!(["kV", "V", "A"].map(|name| Unit::of_voltage(name).is_voltage()), [true, true, false]);
         assert_eq!(names.other_command(), None);
         let heater = UnitNames { voltage: Some("%".into()), ..names };
         assert_eq!(heater.other_command(), Some("%"));

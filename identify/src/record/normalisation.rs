@@ -102,7 +102,7 @@ impl Normalisation {
         let far = |ratio: f64, times: f64| !(1.0 / times..=times).contains(&ratio);
         // The paper's spring is curved over 500 V, and so are others in V whose record stays within.
         let is_usual =
-            nominal.reading.is_none() || scales.units.voltage.si == 1.0 && full_scale_v <= Relaxation::HIGH_V;
+            nominal.reading.is_none() || scales.units.voltage.is_voltage() && full_scale_v <= Relaxation::HIGH_V;
         let reference_v = nominal.relaxation.tau_high_at_v.or(is_usual.then_some(Relaxation::HIGH_V));
         let given = reference_v.filter(|volts| full_scale_v <= 0.0 || !far(full_scale_v / volts, FAR_SIZE));
         let volts = given.unwrap_or(if full_scale_v > 0.0 { full_scale_v } else { Relaxation::HIGH_V });
@@ -234,5 +234,39 @@ fn scaled(file: &PlantFile, time: impl Fn(f64) -> f64, voltage: impl Fn(f64) -> 
             delay_s: amplifier.delay_s.map(&time),
         }),
         ..file.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use model::Plant;
+    use simulation::plant_file::Reading;
+    use simulation::units::Unit;
+
+    use super::*;
+
+    /// The voltage scale of a record in a column of a unit, of an actuator with readings in mm.
+    fn volts(unit: &str, largest: f64) -> f64 {
+        let row = |line: usize| Row {
+            line,
+            time_s: line as f64,
+            voltage_v: if line < 10 { 0.0 } else { largest },
+            measured: Some(0.0),
+        };
+        let record = Record { name: "actuator".into(), rows: (0..100).map(row).collect() };
+        let nominal = PlantFile { reading: Some(Reading { gain: 0.01, zero: 0.0 }), ..PlantFile::from(Plant::PAPER) };
+        let units = Units { voltage: Unit::of_voltage(unit), reading: "mm".into(), ..Units::default() };
+        Normalisation::of(&record, &nominal, Input::Hold, units).scales.volt_v * REFERENCE_VOLTAGE_V
+    }
+
+    #[test]
+    fn the_column_unit_of_a_voltage_does_not_change_its_scale() {
+        assert_eq!(["V", "mV", "kV"].map(|unit| volts(unit, 300.0)), [500.0; 3]);
+        assert_eq!(["V", "kV"].map(|unit| volts(unit, 3000.0)), [3000.0; 2]);
+        assert_eq!(
+            ["%", "A", "N"].map(|unit| volts(unit, 100.0)),
+            [100.0; 3],
+            "no command of another unit has a usual size"
+        );
     }
 }
