@@ -40,11 +40,12 @@ use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
 use crate::record::observed::Observed;
 use crate::search::{Scored, Search, WarmStart};
+use crate::stats::scale::variance;
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
-use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::{self, Diagnosis};
+use crate::verdict::doubt;
 use crate::verdict::held_findings::add_held;
 use crate::verdict::hypotheses::hypotheses;
 use crate::verdict::linear_rival::compare;
@@ -68,14 +69,14 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
     let held = held(record);
     let informative = informative(record, held.as_ref());
     let records = std::slice::from_ref(&*informative);
-    let mut found = joint(records, options, options.causes(), &mut progress)?.with_rivals(records, options);
+    let mut found = diagnose_together(records, options, options.causes(), &mut progress)?.with_rivals(records, options);
     let linear = linear(records, options);
     found.report.linear = linear.as_ref().map(|linear| linear.error);
     // New readings are ahead of the response, because noise decides when they are sent: a linear model of them is no judge.
     let judge = linear.as_ref().filter(|_| !reports_changes(held.as_ref()));
     compare(&mut found, judge);
     credibility::unlikely_to_suspects(&mut found.report);
-    withhold(&mut found.report, options);
+    withhold(&mut found, options);
     hypothesise(&mut found, &records[0], options, judge);
     if let Some(held) = &held {
         add_held(&mut found, record, held, options.input, &options.units);
@@ -84,10 +85,9 @@ pub fn examine(record: &Record, options: &Options, mut progress: impl FnMut(&str
 }
 
 /// Makes a verdict `insufficient` that says nothing of the record.
-pub(super) fn withhold(report: &mut Report, options: &Options) {
-    if options.says_nothing(report.verdict) {
-        report.verdict = Verdict::Insufficient;
-        report.next_experiment = next_experiment(Verdict::Insufficient, &[], &[], false);
+pub(super) fn withhold(diagnosis: &mut Diagnosis, options: &Options) {
+    if options.says_nothing(diagnosis.report.verdict) {
+        diagnosis.conclude(Verdict::Insufficient);
     }
 }
 
@@ -180,7 +180,7 @@ impl Normalised {
 ///
 /// # Errors
 /// The errors of [`examine`], for the first record that has one.
-pub(super) fn joint(
+pub(super) fn diagnose_together(
     records: &[Record],
     options: &Options,
     only: Option<&[&'static str]>,
@@ -430,11 +430,11 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     let report = &mut without.report;
     report.baseline = with.report.baseline;
     report.extended.gain = 1.0 - report.extended.quality.held_out_rmse / report.baseline.held_out_rmse.max(1e-12);
+    let mut verdict = report.verdict;
     // Of an identified spring there is no file to take a part out of.
     if !without.data.normalisation.identified {
-        if report.verdict == Verdict::Consistent {
-            report.verdict = Verdict::Explained;
-            report.suspects.clear();
+        if verdict == Verdict::Consistent {
+            verdict = Verdict::Explained;
         }
         report.take_out = unsupported_terms;
     }
@@ -442,13 +442,19 @@ fn compared_with(with: Diagnosis, mut without: Diagnosis, unsupported_terms: Vec
     for finding in &mut report.findings {
         finding.rmse_before = finding.rmse_before.min(report.baseline.rmse).max(finding.rmse_after);
     }
-    let undetected = credibility::undetected(&without.observed, report.verdict == Verdict::Unexplained);
-    credibility::with_unknown_laws(&mut report.findings, diagnosis::power(&without.data.reading), undetected);
-    if let Some(alone) = credibility::likely_alone(&report.findings).filter(|_| report.verdict == Verdict::Explained) {
-        report.verdict = Verdict::Ambiguous;
+    let undetected = credibility::undetected(&without.observed, verdict == Verdict::Unexplained);
+    credibility::with_unknown_laws(&mut report.findings, variance(&without.data.reading), undetected);
+    if let Some(alone) = credibility::likely_alone(&report.findings).filter(|_| verdict == Verdict::Explained) {
+        verdict = Verdict::Ambiguous;
         report.alternatives.push(alone);
     }
-    diagnosis::without_the_unearned(report, &without.extended);
+    if doubt::is_unearned(&report.findings, &without.extended) {
+        verdict = Verdict::Unexplained;
+        report.leftover.get_or_insert_with(|| doubt::UNEARNED.to_owned());
+    }
+    if verdict != report.verdict {
+        without.conclude(verdict);
+    }
     without.baseline = with.baseline;
     let [before, _] = with.held_out;
     without.held_out[0] = before;

@@ -19,15 +19,16 @@ use simulation::plant_file::PlantFile;
 use simulation::record::Record;
 
 use crate::answer::{Finding, RecordReport, Report, Verdict};
+use crate::dimension::Dimension;
 use crate::effects::{EFFECTS, index_of};
 use crate::examine::options::Options;
-use crate::examine::passes::{self, Normalised, examine, informative, joint, reports_changes, withhold};
+use crate::examine::passes::{self, Normalised, diagnose_together, examine, informative, reports_changes, withhold};
 use crate::plant::base::Base;
 use crate::record::clock::with_times_of_clock;
 use crate::record::held::{Held, held};
 use crate::stats::scale::root_mean_square;
+use crate::stats::thresholds::empirical::FINEST_V;
 use crate::stats::thresholds::probability::CLEARLY_LIKELIER;
-use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 use crate::verdict::held_findings::add_held;
@@ -61,67 +62,66 @@ pub fn examine_several(records: &[Record], options: &Options, mut progress: impl
     let (linear, mut shown) = (passes::linear(records, options), Vec::new());
     for record in records {
         let record = std::slice::from_ref(record);
-        let alone =
-            joint(record, options, options.causes(), &mut |causes| progress(&format!("{}: {causes}", record[0].name)))?;
+        let alone = diagnose_together(record, options, options.causes(), &mut |causes| {
+            progress(&format!("{}: {causes}", record[0].name))
+        })?;
         shown.extend(alone.found.report.findings.iter().map(|finding| finding.cause));
     }
     shown.retain(|cause| !OF_ONE_RECORD.contains(cause));
     let reports = |held: &Option<Held>| reports_changes(held.as_ref());
-    let mut joint = shared(records, records, options, &shown, &mut progress)?;
-    let mut each = of_each(records, &joint, options, &mut progress)?;
+    let mut together = shared(records, records, options, &shown, &mut progress)?;
+    let mut each = of_each(records, &together, options, &mut progress)?;
     // A fault of one record biases what is found in all of them, and that in turn the fault.
     let mut faultless = Cow::Borrowed(records);
     for _ in 0..ROUNDS {
-        if !is_biased(&joint, &each) {
+        if !is_biased(&together, &each) {
             break;
         }
-        let less = without_faults(records, &joint, &each);
+        let less = without_faults(records, &together, &each);
         if less == *faultless {
             break;
         }
         faultless = Cow::Owned(less);
-        joint = shared(&faultless, records, options, &shown, &mut progress)?;
-        each = of_each(records, &joint, options, &mut progress)?;
+        together = shared(&faultless, records, options, &shown, &mut progress)?;
+        each = of_each(records, &together, options, &mut progress)?;
     }
     if let Cow::Owned(faultless) = &faultless {
-        with_faults(&mut joint, records, faultless);
+        with_faults(&mut together, records, faultless);
     }
     // How many readings a link loses, and when, is a matter of each record; a sensor that reports changes does so in all of them.
     let longest = held.iter().flatten().max_by_key(|held| held.rows.len());
     if let Some(shared) = longest.filter(|_| held.iter().all(reports)) {
-        add_held(&mut joint, &records[0], shared, options.input, &options.units);
+        add_held(&mut together, &records[0], shared, options.input, &options.units);
     }
     for (index, (alone, held)) in each.into_iter().zip(&held).enumerate() {
         let record = &records[index];
         let mut alone = alone.without_rivals(std::slice::from_ref(record));
-        let offset = joint.zero_offsets[index] + alone.zero_offsets[0];
+        let offset = together.zero_offsets[index] + alone.zero_offsets[0];
         if let Some(held) = held {
             add_held(&mut alone, record, held, options.input, &options.units);
         }
-        joint.report.complete &= alone.report.complete;
-        let of = of_record(&joint, &alone, &record.name, offset);
+        together.report.complete &= alone.report.complete;
+        let of = of_record(&together, &alone, &record.name, offset);
         // A linear model of all records follows a fault of one, so that the causes are judged with it as well.
-        if let Some(part) = joint.data.parts.get(index).filter(|_| !of.findings.is_empty()) {
-            joint.held_out_in_place[part.rows.clone()].copy_from_slice(&alone.held_out_in_place);
+        if let Some(part) = together.data.parts.get(index).filter(|_| !of.findings.is_empty()) {
+            together.held_out_in_place[part.rows.clone()].copy_from_slice(&alone.held_out_in_place);
         }
-        joint.report.records.push(of);
+        together.report.records.push(of);
     }
-    let verdict = verdict(&joint);
-    if verdict == Verdict::Unexplained && joint.report.verdict != verdict {
-        credibility::in_unexplained(&mut joint.report.findings, 0.0);
-        let Report { findings, alternatives, .. } = &joint.report;
-        joint.report.next_experiment = next_experiment(verdict, findings, alternatives, false);
+    let verdict = verdict(&together);
+    if verdict != together.report.verdict {
+        if verdict == Verdict::Unexplained {
+            credibility::in_unexplained(&mut together.report.findings, 0.0);
+        }
+        together.conclude(verdict);
     }
-    (joint.report.verdict, joint.report.rows) = (verdict, rows);
-    withhold(&mut joint.report, options);
-    if verdict == Verdict::Explained {
-        joint.report.suspects.clear();
-    }
-    joint.report.leftover =
-        joint.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
-    compare(&mut joint, linear.as_ref().filter(|_| !held.iter().any(reports)));
-    credibility::unlikely_to_suspects(&mut joint.report);
-    Ok(joint)
+    together.report.rows = rows;
+    withhold(&mut together, options);
+    together.report.leftover =
+        together.report.records.iter().find_map(|of| Some(format!("{}: {}", of.name, of.leftover.as_ref()?)));
+    compare(&mut together, linear.as_ref().filter(|_| !held.iter().any(reports)));
+    credibility::unlikely_to_suspects(&mut together.report);
+    Ok(together)
 }
 
 /// Returns the records without the likely causes that are found in one of them only. A cause of the spring that is found again in a record
@@ -149,9 +149,10 @@ fn with_faults(joint: &mut Diagnosis, records: &[Record], faultless: &[Record]) 
     }
     let [rmse, held_out_rmse] =
         [&joint.baseline.residual, &joint.held_out[0]].map(|residual| root_mean_square(residual));
+    let finest = joint.data.scales().restored(Dimension::ReadingSize, FINEST_V.get());
     let Report { baseline, extended, findings, .. } = &mut joint.report;
     (baseline.rmse, baseline.held_out_rmse) = (rmse, held_out_rmse);
-    baseline.fit_percent = fit_percent(rmse, &read);
+    baseline.fit_percent = fit_percent(rmse, &read, finest);
     if !findings.is_empty() {
         extended.gain = 1.0 - extended.quality.held_out_rmse / held_out_rmse.max(1e-12);
     }
@@ -172,14 +173,14 @@ fn shared(
     shown: &[&'static str],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Diagnosis> {
-    let joint = joint(records, options, Some(shown), progress)?;
+    let strong = diagnose_together(records, options, Some(shown), progress)?;
     let all: Vec<&'static str> =
         EFFECTS.iter().map(|effect| effect.cause()).filter(|cause| !OF_ONE_RECORD.contains(cause)).collect();
     let all = options.causes().map_or(all, <[_]>::to_vec);
-    let weak = self::joint(records, options, Some(&all), progress)?;
-    let clearly_likelier = weak.found.score > joint.found.score + CLEARLY_LIKELIER;
-    let is_weak = clearly_likelier && predicts_most_records_better(&weak.found, &joint.found);
-    let found = if is_weak { weak } else { joint };
+    let weak = diagnose_together(records, options, Some(&all), progress)?;
+    let clearly_likelier = weak.found.score > strong.found.score + CLEARLY_LIKELIER;
+    let is_weak = clearly_likelier && predicts_most_records_better(&weak.found, &strong.found);
+    let found = if is_weak { weak } else { strong };
     Ok(found.with_rivals(files, options))
 }
 
@@ -198,7 +199,7 @@ fn of_each(
     let alone = |(record, offset): (&Record, &f64)| {
         let from_zero = Record { rows: record.rows.iter().map(|row| row.less(*offset)).collect(), ..record.clone() };
         let mut of_this = |causes: &str| progress(&format!("{}: {causes}", record.name));
-        self::joint(std::slice::from_ref(&from_zero), &options, options.causes(), &mut of_this)
+        diagnose_together(std::slice::from_ref(&from_zero), &options, options.causes(), &mut of_this)
     };
     records.iter().zip(&joint.zero_offsets).map(alone).collect()
 }

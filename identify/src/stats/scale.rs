@@ -27,6 +27,11 @@ pub fn root_mean_square(residual: &[f64]) -> f64 {
     (dot(residual, residual) / residual.len().max(1) as f64).sqrt()
 }
 
+/// Returns the mean square of the values about their mean, in their unit squared.
+pub(crate) fn variance(values: &[f64]) -> f64 {
+    root_mean_square(&centred(values)).powi(2)
+}
+
 /// Returns the second differences, scaled so that independent noise keeps its standard deviation; a slow signal nearly
 /// vanishes.
 pub(crate) fn second_differences(reading: &[f64]) -> impl Iterator<Item = f64> {

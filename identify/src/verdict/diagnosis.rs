@@ -2,24 +2,20 @@
 
 use std::mem;
 
-use crate::adequacy::{self, Unidentifiable, UnmodelledDynamics};
-use crate::answer::{Extended, Finding, Nominal, Report, SCHEMA, SearchReport, Verdict};
-use crate::dimension::Dimension;
+use crate::adequacy::{self, Unidentifiable};
+use crate::answer::{Extended, Finding, Nominal, Quality, Report, SCHEMA, SearchReport, Verdict};
 use crate::effects::model::Model;
 use crate::equation::fitted::Fitted;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
 use crate::record::observed::{Kind, Observed};
-use crate::record::scales::Scales;
 use crate::search::{Scored, WarmStart};
-
-use crate::stats::scale::{centred, root_mean_square};
-use crate::stats::thresholds::empirical::{FINEST_V, SHARE_UNEXPLAINED, STEPS_BEYOND_BOUND};
+use crate::stats::thresholds::empirical::{FINEST_V, STEPS_BEYOND_BOUND};
 use crate::verdict::alternatives::{never_reverses, next_experiment, twin};
 use crate::verdict::credibility;
+use crate::verdict::doubt;
 use crate::verdict::export::{export, restored};
-use crate::verdict::extrapolation::spoiling;
 use crate::verdict::finding::{explained, finding};
 use crate::verdict::found::{self, Found};
 use crate::verdict::margins;
@@ -71,6 +67,21 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Changes the verdict of a finished diagnosis with all that follows from it: the next experiment, no suspects where the findings
+    /// explain the record, and no margins where something was found.
+    pub(crate) fn conclude(&mut self, verdict: Verdict) {
+        let report = &mut self.report;
+        let wanders = self.extended.strongly_autocorrelated();
+        report.verdict = verdict;
+        report.next_experiment = next_experiment(verdict, &report.findings, &report.alternatives, wanders);
+        if verdict == Verdict::Explained {
+            report.suspects.clear();
+        }
+        if !report.findings.is_empty() {
+            report.would_show = None;
+        }
+    }
+
     /// True if the extended simulation goes beyond the bounds at which readings stopped; on a quantisation grid, a plateau may
     /// only look like a bound.
     pub(crate) fn confirms_bounds(&self) -> bool {
@@ -112,40 +123,20 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     }
     let held_out_in_place = engine.held_out_residual_in_place(extended);
     let unmodelled = adequacy::first_significant(engine, extended).filter(|found| found.rms > FINEST_V.get());
-    let left = || unmodelled.as_ref().map(|found| sentence(found, extended, data.scales()));
-    let spoiling = spoiling(engine, &found);
-    let unfinished = engine.budget().was_cut() && adequacy::doubts(engine, extended);
+    let left = unmodelled.as_ref().map(|found| doubt::sentence(found, extended, data.scales()));
     let before = quality(engine, &baseline, &held_out[0], false);
     let after = quality(engine, extended, &held_out[1], true);
 
-    let structured = unmodelled.as_ref().is_some_and(|found| found.share > SHARE_UNEXPLAINED.get());
     let mut findings = findings(engine, &found);
-    let is_structured = structured || !spoiling.is_empty() || unfinished;
-    let undetected = credibility::undetected(observed, is_structured);
-    credibility::with_unknown_laws(&mut findings, power(&data.reading), undetected);
-    if data.normalisation.decays {
-        credibility::of_slow(&mut findings);
-    }
-    let unearned = is_unearned(&findings, extended);
-    if data.normalisation.identified {
-        credibility::of_identified(&mut findings);
-    }
-    let lacking = data.normalisation.identified && credibility::are_linear(&findings);
-    let endless = credibility::of_levels_without_end(&mut findings);
-    let unexplained = structured || !spoiling.is_empty() || unfinished || unearned || lacking || endless;
-    credibility::of_spoiling(&mut findings, &spoiling);
-    if unexplained {
-        let share = unmodelled.as_ref().map_or(0.0, |found| found.share);
-        credibility::in_unexplained(&mut findings, share * found.regular.rms(&extended.residual).powi(2));
-    }
+    let doubt = doubt::weigh(engine, &found, unmodelled.as_ref(), &mut findings);
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alone = credibility::likely_alone(&findings).filter(|alone| !found.rivals.contains(alone));
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).chain(alone).collect();
     // What was identified from the same readings is no error that they would have shown.
-    let would_show = (findings.is_empty() && !unexplained && !data.normalisation.identified)
+    let would_show = (findings.is_empty() && doubt.is_none() && !data.normalisation.identified)
         .then(|| margins::margins(engine, extended, found.warm_start.penalty_factor));
     let insufficient = would_show.as_ref().is_some_and(|margins| !margins::informative(margins, engine.base()));
-    let verdict = verdict(unexplained, &alternatives, insufficient, &findings);
+    let verdict = verdict(doubt.is_some(), &alternatives, insufficient, &findings);
     let may_be_suspect = |cause| match verdict {
         Verdict::Explained => false,
         // The open question is which of the alternatives it is.
@@ -164,13 +155,6 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     let export = export(engine, found.model(), reading_map, held);
 
     let report = Report {
-        schema: SCHEMA,
-        rows: data.rows(),
-        complete: true,
-        search: SearchReport::default(),
-        verdict,
-        nominal: Nominal::default(),
-        baseline: before,
         extended: Extended {
             gain,
             quality: after,
@@ -182,26 +166,10 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
         next_experiment: next_experiment(verdict, &findings, &alternatives, extended.strongly_autocorrelated()),
         findings,
         suspects,
-        take_out: Vec::new(),
         would_show,
         alternatives,
-        linear: None,
-        equation: None,
-        equation_details: None,
-        leftover: match spoiling.first() {
-            _ if structured => left(),
-            Some(spoils) => Some(spoils.sentence(data.scales())),
-            None if unfinished => Some(UNFINISHED.to_owned()),
-            None if unearned => Some(UNEARNED.to_owned()),
-            None if lacking => Some(LACKING.to_owned()),
-            None if endless => Some(ENDLESS.to_owned()),
-            None => left(),
-        },
-        noise: noise_report(&extended.noise),
-        residual: residual_report(data, extended),
-        records: Vec::new(),
-        rivals: Vec::new(),
-        experiment: None,
+        leftover: doubt.or(left),
+        ..without_findings(data, extended, verdict, before)
     };
     found.add_contenders(sets);
     Diagnosis {
@@ -225,9 +193,40 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
     }
 }
 
-/// Returns the mean square of readings about their mean.
-pub(crate) fn power(reading: &[f64]) -> f64 {
-    root_mean_square(&centred(reading)).powi(2)
+/// The report of a record before anything is found, with the noise and the residual of a fit; `quality` is of the simulation as it is given.
+fn without_findings(data: &Data, fit: &Fit, verdict: Verdict, quality: Quality) -> Report {
+    Report {
+        schema: SCHEMA,
+        rows: data.rows(),
+        complete: true,
+        search: SearchReport::default(),
+        verdict,
+        nominal: Nominal::default(),
+        baseline: quality,
+        findings: Vec::new(),
+        suspects: Vec::new(),
+        take_out: Vec::new(),
+        would_show: None,
+        alternatives: Vec::new(),
+        next_experiment: None,
+        extended: Extended {
+            quality,
+            gain: 0.0,
+            law_range_v: None,
+            model: None,
+            fixed_point_error_v: None,
+            tick_refuses: None,
+        },
+        linear: None,
+        equation: None,
+        equation_details: None,
+        leftover: None,
+        noise: noise_report(&fit.noise),
+        residual: residual_report(data, fit),
+        records: Vec::new(),
+        rivals: Vec::new(),
+        experiment: None,
+    }
 }
 
 /// All findings, the one that explains the largest mean square error first.
@@ -251,81 +250,15 @@ fn verdict(unexplained: bool, alternatives: &[Vec<&'static str>], insufficient: 
     }
 }
 
-/// True if the residual is autocorrelated and no cause removes much of it: an autoregression follows errors of the model as well as slow
-/// noise.
-fn is_unearned(findings: &[Finding], extended: &Fit) -> bool {
-    !extended.noise.autocorrelation.is_white() && credibility::are_unlikely(findings)
-}
-
-/// Makes the verdict `unexplained` if no cause removes much of an autocorrelated residual.
-pub(crate) fn without_the_unearned(report: &mut Report, extended: &Fit) {
-    if is_unearned(&report.findings, extended) {
-        report.verdict = Verdict::Unexplained;
-        report.leftover.get_or_insert_with(|| UNEARNED.to_owned());
-    }
-}
-
-/// The report's sentence on a search that its budget ended.
-const UNFINISHED: &str = "The search ended before it had tried all that it would, and the residual may hold structure: a larger effort may find more";
-
-/// The report's sentence on causes that remove little of an autocorrelated error.
-const UNEARNED: &str =
-    "The residual is autocorrelated, slow noise or an error of the simulation, and no cause removes much of it";
-
-/// The report's sentence on linear dynamics that an identified spring lacks.
-const LACKING: &str = "Further linear dynamics explain part of the error, but the nominal spring was identified from these readings: they are part of it, or take the place of a cause that no model describes";
-
-/// The report's sentence on readings that are shifted to more levels than are looked for.
-const ENDLESS: &str =
-    "The error steps more often than a shift of the readings does: it may follow a law that no cause describes";
-
-/// The report's sentence on unmodelled dynamics.
-fn sentence(found: &UnmodelledDynamics, extended: &Fit, scales: &Scales) -> String {
-    let UnmodelledDynamics { place, share, rms, whitened, .. } = found;
-    let (of, rms) = match *whitened && !extended.noise.autocorrelation.is_white() {
-        true => ("the one-step error", share.max(0.0).sqrt() * extended.noise.sigma),
-        false => ("the residual", *rms),
-    };
-    let rms = scales.shown_in_four_digits(Dimension::ReadingSize, rms);
-    format!("{:.1} % of {of} ({rms} RMS) is structure, not noise: it shows {place}", 100.0 * share)
-}
-
 /// Reports a record that identifies no spring.
 fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diagnosis {
     let data = engine.data;
     let held_out = baseline.residual.clone();
     let quality = quality(engine, &baseline, &held_out, false);
     let report = Report {
-        schema: SCHEMA,
-        rows: data.rows(),
-        complete: true,
-        search: SearchReport::default(),
-        verdict: reason.verdict(),
-        nominal: Nominal::default(),
-        baseline: quality,
-        findings: Vec::new(),
-        suspects: Vec::new(),
-        take_out: Vec::new(),
-        would_show: None,
-        alternatives: Vec::new(),
         next_experiment: Some(reason.next_experiment().into()),
-        extended: Extended {
-            quality,
-            gain: 0.0,
-            law_range_v: None,
-            model: None,
-            fixed_point_error_v: None,
-            tick_refuses: None,
-        },
-        linear: None,
-        equation: None,
-        equation_details: None,
         leftover: reason.leftover(),
-        noise: noise_report(&baseline.noise),
-        residual: residual_report(data, &baseline),
-        records: Vec::new(),
-        rivals: Vec::new(),
-        experiment: None,
+        ..without_findings(data, &baseline, reason.verdict(), quality)
     };
     Diagnosis {
         report,

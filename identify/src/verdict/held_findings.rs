@@ -83,7 +83,6 @@ pub(crate) fn add_held(diagnosis: &mut Diagnosis, record: &Record, held: &Held, 
     report.findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
     report.suspects.retain(|suspect| suspect.cause != cause);
     if matches!(report.verdict, Verdict::Consistent | Verdict::Insufficient) {
-        report.verdict = Verdict::Explained;
-        report.suspects.clear();
+        diagnosis.conclude(Verdict::Explained);
     }
 }

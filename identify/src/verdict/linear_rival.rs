@@ -12,7 +12,6 @@ use crate::record::observed::Kind;
 use crate::stats::scale::root_mean_square;
 use crate::stats::segments::{SEGMENTS, is_worse};
 use crate::stats::thresholds::empirical::{FINEST_V, WORSE_THAN_LINEAR};
-use crate::verdict::alternatives::next_experiment;
 use crate::verdict::credibility;
 use crate::verdict::diagnosis::Diagnosis;
 
@@ -44,18 +43,15 @@ pub(crate) fn compare(diagnosis: &mut Diagnosis, linear: Option<&BestLinear>) {
     let shown = |errors: &[f64]| {
         diagnosis.data.normalisation.scales.four_digits(Dimension::ReadingSize, root_mean_square(errors))
     };
-    if report.verdict != Verdict::Unexplained {
-        let beyond = root_mean_square(&ours).powi(2) - root_mean_square(&theirs).powi(2);
-        credibility::in_unexplained(&mut report.findings, beyond);
-    }
-    report.verdict = Verdict::Unexplained;
-    report.next_experiment = next_experiment(report.verdict, &report.findings, &report.alternatives, false);
+    let beyond = root_mean_square(&ours).powi(2) - root_mean_square(&theirs).powi(2);
+    credibility::in_unexplained(&mut report.findings, beyond);
     report.leftover = Some(format!(
         "A linear model of order {} predicts held-out segments better than this simulation, with an error of {} instead of {}",
         linear.error.order,
         shown(&theirs),
         shown(&ours)
     ));
+    diagnosis.conclude(Verdict::Unexplained);
 }
 
 /// True if a reading, known as `observed` and, where outliers say nothing, as `regular`, judges between the errors of both models. At a

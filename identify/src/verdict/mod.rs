@@ -21,6 +21,7 @@ pub mod alternatives;
 mod cause;
 pub(crate) mod credibility;
 pub mod diagnosis;
+pub(crate) mod doubt;
 pub mod export;
 mod extrapolation;
 mod fewer_lags;

@@ -22,17 +22,17 @@ pub(crate) fn quality(engine: &Engine, fit: &Fit, held_out: &[f64], stops: bool)
     let rmse = error(&fit.residual);
     Quality {
         rmse,
-        fit_percent: fit_percent(rmse, &engine.data.reading),
+        fit_percent: fit_percent(rmse, &engine.data.reading, FINEST_V.get()),
         held_out_rmse: error(held_out),
         one_step_rmse: error(&fit.noise.whitened(&fit.residual)),
     }
 }
 
 /// The part of the spread of `readings` that is left out of an error with this root mean square, in percent: 100 where there is no
-/// error, and undefined, NaN, for readings that never change.
-pub(crate) fn fit_percent(rmse: f64, readings: &[f64]) -> f64 {
+/// error, and undefined, NaN, for readings that never change by more than `finest`; all three in one unit.
+pub(crate) fn fit_percent(rmse: f64, readings: &[f64], finest: f64) -> f64 {
     let spread = root_mean_square(&centred(readings));
-    if spread > FINEST_V.get() { 100.0 * (1.0 - rmse / spread) } else { f64::NAN }
+    if spread > finest { 100.0 * (1.0 - rmse / spread) } else { f64::NAN }
 }
 
 /// Parameters of the noise for the report.
