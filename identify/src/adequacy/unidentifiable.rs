@@ -11,13 +11,15 @@ pub enum Unidentifiable {
     DeadSensor(String),
     /// The readings are not those of a spring but noise; the sentence says what the voltage does.
     Noise(String),
+    /// The command follows the readings, so that an error of the simulation and noise in the command are not told apart.
+    Feedback,
 }
 
 impl Unidentifiable {
     /// Verdict of the report: `insufficient` for too little excitation, `unexplained` for a sensor that does not read the spring.
     pub(crate) fn verdict(&self) -> Verdict {
         match self {
-            Self::Excitation => Verdict::Insufficient,
+            Self::Excitation | Self::Feedback => Verdict::Insufficient,
             Self::DeadSensor(_) | Self::Noise(_) => Verdict::Unexplained,
         }
     }
@@ -27,6 +29,11 @@ impl Unidentifiable {
         match self {
             Self::Excitation => None,
             Self::DeadSensor(what) | Self::Noise(what) => Some(what.clone()),
+            Self::Feedback => Some(
+                "The command follows the readings, noise included: the record was made in feedback, and what is left of the \
+                 readings may be that noise or an error of the simulation"
+                    .to_owned(),
+            ),
         }
     }
 
@@ -37,6 +44,7 @@ impl Unidentifiable {
                 "run a stair over the whole range up and down again, each step held for five time constants: this \
                  record does not identify the gain or the time constant"
             }
+            Self::Feedback => "run a schedule that does not depend on the readings",
             Self::DeadSensor(_) => "check the sensor and its cable, then repeat the record",
             Self::Noise(_) => {
                 "check that the sensor reads this spring and that voltage and readings are those of one experiment, then \

@@ -16,6 +16,7 @@ pub(crate) mod changes;
 pub mod clock;
 pub mod data;
 pub(crate) mod decay;
+pub(crate) mod feedback;
 pub(crate) mod first_order;
 pub(crate) mod folds;
 pub mod held;

@@ -9,6 +9,7 @@ use crate::equation::fitted::Fitted;
 use crate::fit::engine::{Engine, Fit};
 use crate::plant::base::Base;
 use crate::record::data::Data;
+use crate::record::feedback::is_in_feedback;
 use crate::record::observed::{Kind, Observed};
 use crate::search::{Scored, WarmStart};
 use crate::stats::thresholds::empirical::{FINEST_V, STEPS_BEYOND_BOUND};
@@ -129,6 +130,9 @@ fn identified(engine: &mut Engine, held: bool, mut baseline: Fit, mut found: Fou
 
     let mut findings = findings(engine, &found);
     let doubt = doubt::weigh(engine, &found, unmodelled.as_ref(), &mut findings);
+    if doubt.is_some() && data.uniform && is_in_feedback(&data.voltage_v, &data.reading) {
+        return unidentified(engine, baseline, &Unidentifiable::Feedback);
+    }
     let twin = never_reverses(data).then(|| twin(&findings)).flatten();
     let alone = credibility::likely_alone(&findings).filter(|alone| !found.rivals.contains(alone));
     let alternatives: Vec<Vec<&str>> = found.rivals.iter().cloned().chain(twin).chain(alone).collect();
