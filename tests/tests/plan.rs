@@ -103,13 +103,18 @@ fn suspects_of_the_reports_stair_are_decided_by_the_planned_experiment() {
     assert!(said.contains("odds today") && said.contains("run the same schedule again"), "{said}");
 }
 
-/// An amplifier whose supply sags is a limit, and something else that no cause describes.
-#[test]
-fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
+/// A folder with the record `first.csv` of an amplifier whose supply sags: a limit, and something else that no cause describes.
+fn with_sagging_supply() -> TempDir {
     let folder = tempdir().unwrap();
     let forms = validation::ground_truth::out_of_model::all();
     let sagging = forms.iter().find(|form| form.name == "sagging supply").expect("a form");
     fs::write(folder.path().join("first.csv"), sagging.draw(71).csv()).unwrap();
+    folder
+}
+
+#[test]
+fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
+    let folder = with_sagging_supply();
     let report = json(folder.path(), &["diagnose", "first.csv", "--json"]);
     assert_eq!(report["verdict"], "unexplained", "{report}");
     fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
@@ -124,6 +129,18 @@ fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
     for suspect in plan["suspects"].as_array().unwrap() {
         assert!(decides.contains(&suspect["causes"]) && decides.contains(&suspect["rival"]), "{suspect}, {plan}");
     }
+}
+
+/// The spring that is reported is not the one of the search, where the causes need no other gain and time constant.
+#[test]
+fn the_suspects_beside_an_identified_spring_are_in_the_plan() {
+    let folder = with_sagging_supply();
+    let report = json(folder.path(), &["diagnose", "first.csv", "--plant", "identify", "--json"]);
+    assert_eq!((&report["verdict"], &report["rivals"][0]["nats"]), (&"unexplained".into(), &0.0.into()), "{report}");
+    fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
+    let plan = json(folder.path(), &["plan", "first.json", "--minutes", "2", "--json"]);
+    let count = |list: &Value| list.as_array().expect("a list").len();
+    assert!(count(&plan["suspects"]) >= 1 && count(&plan["decides"]) >= 2, "{plan}");
 }
 
 #[test]

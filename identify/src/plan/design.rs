@@ -4,6 +4,7 @@ use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use simulation::bad_input;
 
+use crate::effects::effect::Coordinate;
 use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::hypotheses::{FittedBlock, Rival};
@@ -78,21 +79,24 @@ impl Hypothesis {
     pub(super) fn of(rival: &Rival, named: bool, data: &Data, name: &str) -> Result<Self> {
         let mut model = Model::default();
         let (mut kept, mut fitted) = (Vec::new(), 0);
+        // A record that may not begin at rest has its states at the beginning behind all other coordinates; the next one begins at rest.
+        let unsettled = Data { initial_state_unknown: true, ..data.clone() };
         for FittedBlock { cause, form, point } in &rival.blocks {
             let Some(effect) = index_of(cause).filter(|&effect| *form < EFFECTS[effect].forms()) else {
                 bad_input!("{name}: cause {cause}, form {form}: expected a cause and a form of this version of vsj");
             };
             let block = Block { effect, form: *form };
-            let coordinates = block.coordinates(data);
-            if coordinates.len() != point.len() || point.iter().any(|value| !value.is_finite()) {
-                bad_input!("{name}: cause {cause}: {} numbers; expected {}", point.len(), coordinates.len());
+            let [at_rest, moving] = [data, &unsettled].map(|data| block.coordinates(data));
+            let of_record = if point.len() == moving.len() { &moving } else { &at_rest };
+            if of_record.len() != point.len() || point.iter().any(|value| !value.is_finite()) {
+                bad_input!("{name}: cause {cause}: {} numbers; expected {}", point.len(), at_rest.len());
             }
-            let count = coordinates.iter().filter(|coordinate| coordinate.fitted).count();
+            let fitted_of = |of: &[Coordinate]| of.iter().filter(|coordinate| coordinate.fitted).count();
             if of_the_spring(cause) {
-                kept.extend(fitted..fitted + count);
-                model = model.with(block, point.clone());
+                kept.extend(fitted..fitted + fitted_of(&at_rest));
+                model = model.with(block, point[..at_rest.len()].to_vec());
             }
-            fitted += count;
+            fitted += fitted_of(of_record);
         }
         let square = rival.covariance.len() == fitted && rival.covariance.iter().all(|row| row.len() == fitted);
         let entry = |row: usize, column: usize| rival.covariance[kept[row]][kept[column]];
@@ -175,5 +179,36 @@ impl Hypothesis {
     pub(super) fn claims(&self, cause: &str) -> bool {
         let special = index_of(cause).map_or(&[][..], |effect| EFFECTS[effect].special_case_of());
         self.model.blocks.iter().any(|(block, _)| block.cause() == cause || special.contains(&block.cause()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use simulation::record::{Record, Row};
+
+    use super::*;
+    use crate::record::input::Input;
+
+    /// A rate-limited amplifier of a record that may not begin at rest has a voltage before the first row, which the next record has not.
+    #[test]
+    fn a_state_at_the_beginning_of_the_record_is_left_out_of_the_next_one() {
+        let row = |line: usize| Row { line, time_s: line as f64, voltage_v: 0.0, measured: Some(0.0) };
+        let record = Record { name: String::new(), rows: (0..100).map(row).collect() };
+        let data = Data { initial_state_unknown: false, ..Data::new(&record, Input::Hold) };
+        let rival = |point: &[f64]| Rival {
+            causes: vec!["amplifier-slew".into(), "gain-error".into()],
+            nats: 0.0,
+            parameters: Default::default(),
+            blocks: [("amplifier-slew", 1, point), ("gain-error", 0, &[0.1])]
+                .map(|(cause, form, point)| FittedBlock { cause: cause.into(), form, point: point.to_vec() })
+                .into(),
+            covariance: (0..4).map(|row| (0..4).map(|column| f64::from(10 * row + column)).collect()).collect(),
+        };
+        let hypothesis = Hypothesis::of(&rival(&[6.0, 9.0, -158.0]), true, &data, "first.json").unwrap();
+        assert_eq!(hypothesis.model.points(), [6.0, 9.0, 0.1]);
+        let covariance = hypothesis.covariance.unwrap();
+        assert_eq!((covariance.nrows(), covariance[(2, 2)], covariance[(1, 2)]), (3, 33.0, 13.0));
+        let error = Hypothesis::of(&rival(&[6.0]), true, &data, "first.json").unwrap_err().to_string();
+        assert_eq!(error, "first.json: cause amplifier-slew: 1 numbers; expected 2");
     }
 }

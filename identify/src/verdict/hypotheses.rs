@@ -24,13 +24,14 @@ const TIMES_RIVAL_ODDS: f64 = 10.0;
 /// Returns the rivals of a diagnosis that is not restored yet, and its experiment.
 pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit: &str) -> (Vec<Rival>, Experiment) {
     let experiment = experiment(diagnosis, records, reading_unit);
-    let Some(best) = diagnosis.contenders.iter().find(|it| it.fit.model == diagnosis.extended.model) else {
+    if diagnosis.contenders.is_empty() {
         return (Vec::new(), experiment);
-    };
+    }
+    let best = &diagnosis.extended;
     let names = |model: &Model| effects(model).iter().map(|&effect| EFFECTS[effect].cause()).collect::<Vec<_>>();
     let named = |model: &Model| diagnosis.report.alternatives.iter().any(|set| same(set, &names(model)));
     let unexplained = diagnosis.unexplained_v > 0.0;
-    let near = |score: f64| unexplained || score > best.score - TIMES_RIVAL_ODDS * RIVAL_ODDS;
+    let near = |score: f64| unexplained || score > diagnosis.score - TIMES_RIVAL_ODDS * RIVAL_ODDS;
     // The sets of the suspects, and those without a finding, in which a verdict that becomes `unexplained` later makes a suspect.
     let is_suspect = |causes: &[&str]| {
         let set = |suspect: &Suspect| suspect.with.iter().copied().chain([suspect.cause]).collect::<Vec<_>>();
@@ -42,21 +43,21 @@ pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit
         let causes = names(model);
         diagnosis.report.verdict != Verdict::Ambiguous && (is_suspect(&causes) || without_finding(&causes))
     };
-    let others = diagnosis.contenders.iter().filter(|it| it.fit.model.structure() != best.fit.model.structure());
+    let others = diagnosis.contenders.iter().filter(|it| it.fit.model.structure() != best.model.structure());
     let (asked, others): (Vec<_>, Vec<_>) = others.partition(|it| named(&it.fit.model));
     let (doubtful, others): (Vec<_>, Vec<_>) = others.into_iter().partition(|it| in_doubt(&it.fit.model));
     let most = MOST_FURTHER.saturating_sub(doubtful.len());
     let further = others.into_iter().filter(|it| near(it.score)).take(most);
     let mut engine = Engine::new(&diagnosis.data, &diagnosis.observed, &diagnosis.base);
-    let mut rivals = vec![rival(&mut engine, &best.fit, 0.0)];
+    let mut rivals = vec![rival(&mut engine, best, 0.0)];
     for other in asked.into_iter().chain(doubtful).chain(further) {
-        rivals.push(rival(&mut engine, &other.fit, other.score - best.score));
+        rivals.push(rival(&mut engine, &other.fit, (other.score - diagnosis.score).min(0.0)));
     }
     for set in &diagnosis.report.alternatives {
         if !rivals.iter().any(|rival| same(set, &rival.causes))
-            && let Some(fit) = exchanged(&mut engine, &best.fit, set)
+            && let Some(fit) = exchanged(&mut engine, best, set)
         {
-            let nats = (fit.log_likelihood - best.fit.log_likelihood).min(0.0);
+            let nats = (fit.log_likelihood - best.log_likelihood).min(0.0);
             rivals.push(rival(&mut engine, &fit, nats));
         }
     }
