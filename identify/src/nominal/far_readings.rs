@@ -10,9 +10,9 @@ use crate::record::changes::{changes, follow};
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::thresholds::empirical::ROWS_AFTER_CHANGE;
 
-/// A reading is far off if it deviates from those around it by more scales of all such deviations, ...
+/// A reading is far off if it deviates from those around it by more than this number of scales of all such deviations.
 const FAR: f64 = 10.0;
-/// ... and alone if those next to it deviate by fewer.
+/// A far reading is alone if those next to it deviate by fewer scales than this.
 const NEAR: f64 = 4.0;
 /// Most readings in succession that are far off for the same reason.
 const LONGEST_RUN: usize = 2;

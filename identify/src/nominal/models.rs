@@ -16,14 +16,14 @@ use crate::stats::segments::excess;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::probability::{RIVAL_ODDS, Z, Z_DOUBTFUL, Z_WORSE};
 
-/// A larger model is preferred if its held-out error is smaller by this part, ...
+/// Part by which the held-out error of a larger model is smaller, if it is preferred.
 pub const WORTHWHILE: f64 = 0.005;
-/// ... and its error on the last part of the records, which is an extrapolation, is at most this many times as large: beyond, it
-/// does not hold at all. Below, a remark says what is lost.
+/// Largest error of a larger model on the last part of the records, which is an extrapolation, relative to that of the smaller one, if
+/// it is preferred: beyond, it does not hold at all. Below, a remark says what is lost.
 pub(super) const MOST_SPOILED: f64 = 10.0;
-/// Gain in log-likelihood, in nats, that each further pole has to bring beyond chance, ...
+/// Gain in log-likelihood, in nats, that each further pole has to bring beyond chance.
 const PRICE_OF_POLE: f64 = 4.0;
-/// ... and that it has to bring if the last part of the records confirms it by a smaller error.
+/// Gain in log-likelihood, in nats, that each further pole has to bring if the last part of the records confirms it by a smaller error.
 const PRICE_IF_CONFIRMED: f64 = 3.0;
 /// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
 pub(super) const STRUCTURED: f64 = 3.0;
@@ -86,10 +86,13 @@ impl Models {
             Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
         };
         let mut fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
-        let beaten = |small: usize| (small + 1..fits.len()).any(|large| beats(&problem, &fits[large], &fits[small]));
-        let chosen = (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten");
-        if let Some(fit) = without_undriven(&problem, &fits[chosen].fit) {
+        let mut chosen = unbeaten(&problem, &fits);
+        // What the voltage does not drive may be all that made the model better than a smaller one.
+        let largest = chosen;
+        for _ in 0..=largest {
+            let Some(fit) = without_undriven(&problem, &fits[chosen].fit) else { break };
             fits[chosen] = with_errors(fit);
+            chosen = unbeaten(&problem, &fits[..=largest]);
         }
         Self { law, problem, fits, chosen }
     }
@@ -142,6 +145,12 @@ fn error(order: usize, fit: &Fit, held_out: &[f64], last_part: f64) -> LinearErr
         held_out_rmse: root_mean_square(held_out),
         last_40_percent_rmse: last_part,
     }
+}
+
+/// The smallest order whose model no larger one beats.
+fn unbeaten(problem: &Problem, fits: &[Model]) -> usize {
+    let beaten = |small: usize| fits[small + 1..].iter().any(|large| beats(problem, large, &fits[small]));
+    (0..fits.len()).find(|&order| !beaten(order)).expect("the largest order is never beaten")
 }
 
 /// True if the held-out error of a larger model is smaller by more than is worthwhile and beyond chance, and the model extrapolates. The

@@ -172,7 +172,7 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
             let fewest = fewest_readings(problem, order + 1);
             format!("a model of order {} is not tried with fewer than {fewest} readings", order + 1)
         } else {
-            "no linear model of order 4 or less describes all of the response; `vsj diagnose` looks for what else is in it".into()
+            "the noise is slow, or no linear model of order 4 or less describes all of the response; `vsj diagnose` decides".into()
         };
         remarks.push(format!(
             "The errors ({} {}) exceed their scatter from row to row ({} {}): {why}.",

@@ -53,8 +53,12 @@ pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
 pub(super) fn orders(report: &Report) -> Vec<Line> {
     let with_static = std::iter::once((0, report.static_held_out_rmse));
     let others = report.linear.iter().map(|linear| (linear.order, linear.held_out_rmse));
-    let mark = |order| if order == report.order + report.undriven_order { "nominal" } else { "" };
-    with_static.chain(others).map(|(order, error)| [order.to_string(), number(error), mark(order).into()]).collect()
+    let nominal = match report.undriven_order {
+        0 => "nominal".to_owned(),
+        count => format!("nominal, {count} of its poles not driven"),
+    };
+    let mark = |order| if order == report.order + report.undriven_order { nominal.clone() } else { String::new() };
+    with_static.chain(others).map(|(order, error)| [order.to_string(), number(error), mark(order)]).collect()
 }
 
 /// What was identified, in one sentence.
