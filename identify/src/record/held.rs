@@ -25,8 +25,12 @@ use crate::stats::thresholds::probability::Z_RARE;
 const SMALLEST: f64 = 0.05;
 /// Smallest change, relative to the median change, that shows a threshold.
 const THRESHOLD: f64 = 0.3;
+/// Largest number of readings that return to the one before last, relative to those that repeat the one before, where these were held.
+const RETURNS_PER_REPEAT: f64 = 0.25;
 /// Size of the changes after held readings, relative to that of the others, from which they catch up.
 const CATCHING_UP: f64 = 0.8;
+/// Mean number of rows from one new reading to the next, above which a clock may set it: with less, some readings are lost.
+const QUICKEST_CLOCK: f64 = 1.5;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
 const CLOCK: f64 = 0.3;
 /// Largest scatter of the sizes of changes, relative to that of their rates, where changes of one size are reported.
@@ -137,9 +141,10 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
         |value: f64| [Some(low), Some(high), Some(0.0), bound].iter().flatten().any(|&special| equal(value, special));
     let changing: Vec<usize> = (0..rows.len()).filter(|&row| !repeats(row) || is_special(reading(row))).collect();
     let values: Vec<f64> = changing.iter().map(|&row| reading(row)).collect();
-    let too_few = (rows.len() - changing.len()) < (LEAST_HELD.get() * rows.len() as f64) as usize;
+    let held_rows = rows.len() - changing.len();
+    let too_few = held_rows < (LEAST_HELD.get() * rows.len() as f64) as usize;
     let changes_after = |held: bool| changes_at_rest(record, rows, &changing, held);
-    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, equal, [true, false].map(changes_after)) {
+    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, held_rows, equal, [true, false].map(changes_after)) {
         return None;
     }
     // A held reading may be the highest one, but a bound is reached again and again.
@@ -174,7 +179,12 @@ fn changes_at_rest(record: &Record, rows: &[(usize, f64, f64)], new: &[usize], h
 /// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between. They
 /// are noise or changes of a least size, or those after held readings, the first of the given changes at rest, catch up: a rounded
 /// response repeats where it hardly changes, and then changes least.
-fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool, [after_held, others]: [Vec<f64>; 2]) -> bool {
+fn is_held(
+    new: &[f64],
+    held_rows: usize,
+    equal: impl Fn(f64, f64) -> bool,
+    [after_held, others]: [Vec<f64>; 2],
+) -> bool {
     let changes = changes(new);
     let [smallest, middle] = [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]];
     let returns = new.windows(3).filter(|of| equal(of[2], of[0]) && !equal(of[1], of[0])).count();
@@ -186,7 +196,9 @@ fn is_held(new: &[f64], equal: impl Fn(f64, f64) -> bool, [after_held, others]: 
     let grid = QuantisationGrid::of(&distinct).map_or(0.0, |grid| grid.step);
     let [held, direct] = [&after_held, &others].map(|changes| median(&mut changes.clone()).unwrap_or(0.0));
     let catches_up = after_held.len() >= FEWEST_NEW && held > CATCHING_UP * direct;
-    part(returns) < MOST_RETURNS.get()
+    // A grid makes readings return nearly as often as repeat.
+    let repeats = held_rows as f64 / new.len() as f64;
+    part(returns) < MOST_RETURNS.get().min(RETURNS_PER_REPEAT * repeats)
         && grid < COARSEST_GRID_OF_HELD.get() * middle
         && (part(turns) > TURNING || smallest > THRESHOLD * middle || catches_up)
 }
@@ -225,7 +237,7 @@ fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason 
     let variance: f64 = clipped.iter().map(|length| (length - mean).powi(2)).sum();
     let after =
         |values: &[f64]| rank_correlation(&values[..values.len().saturating_sub(1)], clipped.get(1..).unwrap_or(&[]));
-    if variance < (CLOCK * mean).powi(2) * clipped.len() as f64 {
+    if mean > QUICKEST_CLOCK && variance < (CLOCK * mean).powi(2) * clipped.len() as f64 {
         Reason::SlowClock
     } else if -after(&sizes) > Z_RARE || none_is_small && (of_one_size || after(&clipped) > Z_RARE) {
         Reason::ReportsChanges
@@ -259,6 +271,17 @@ mod tests {
             Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(before) }
         });
         Record { name: String::new(), rows: rows.collect() }
+    }
+
+    #[test]
+    fn a_few_lost_readings_are_held_and_a_few_that_a_grid_repeats_are_not() {
+        for part in [0.07, 0.12] {
+            let lost = held(&record(|before, new, random| if random < part { before } else { new })).unwrap();
+            assert!(lost.reason == Reason::Lost && (lost.fraction - part).abs() < 0.02, "{lost:?}");
+        }
+        for step in [0.1, 0.2, 0.3, 0.5] {
+            assert_eq!(held(&record(|_, new, _| (new / step).round() * step)), None, "{step}");
+        }
     }
 
     #[test]
@@ -344,7 +367,7 @@ mod tests {
             row.measured = Some((1e3f64 * state).round() / 1e3);
         }
         let mut beyond = bound.clone();
-        (50..ROWS).step_by(150).for_each(|row| beyond.rows[row].measured = Some(500.0));
+        (50..ROWS).step_by(150).for_each(|row| beyond.rows[row].measured = Some(500.0 + row as f64));
         for record in [grid(0.01), grid(1.0), grid(4.0), grid(12.0), bound, beyond, smooth, record(|_, new, _| new)] {
             assert!(held(&record).is_none());
         }

@@ -20,7 +20,7 @@ use simulation::record::Record;
 
 use crate::record::bounds::Bounds;
 use crate::stats::median::median;
-use crate::stats::thresholds::empirical::{FEWEST_TIES, LEAST_HELD, SHORTEST_RUN};
+use crate::stats::thresholds::empirical::{FEWEST_TIES, MOST_REPEATED, SHORTEST_RUN};
 
 /// Largest difference of equal readings, relative to the range of all: what converting between units leaves.
 pub(super) const ROUNDING: f64 = 1e-12;
@@ -62,7 +62,7 @@ struct Readings {
     rounding: f64,
     /// Smallest change of the voltage that counts, in V.
     change_v: f64,
-    /// True for a reading that belongs to no run of [`FEWEST_TIES`] or more.
+    /// True for a reading that belongs to no run of [`FEWEST_TIES`] or more, and to no dropout.
     free: Vec<bool>,
     /// Smallest change from one free reading to the next that is not 0, median and largest one.
     smallest: f64,
@@ -80,11 +80,14 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let [low, high] = range(&value);
     let rounding = ROUNDING * (high - low);
     let runs = runs(value.len(), |row| (value[row] - value[row - 1]).abs() <= rounding);
-    // Shorter ones prove nothing, and most records have no other.
-    if runs.iter().all(|run| run.len() < FEWEST_TIES.count()) {
+    let dropped = dropouts(&value, &voltage, &runs, rounding);
+    // Shorter runs of other values prove nothing, and most records have no other.
+    if dropped.is_empty() && runs.iter().all(|run| run.len() < FEWEST_TIES.count()) {
         return None;
     }
-    let readings = Readings::of(value, voltage, rounding, &runs)?;
+    let (short, runs): (Vec<_>, Vec<_>) = runs.into_iter().partition(|run| dropped.contains(run));
+    let tied = runs.iter().filter(|run| run.len() >= FEWEST_TIES.count()).chain(&short);
+    let readings = Readings::of(value, voltage, rounding, tied)?;
     // The first readings may be those of a spring at rest in a simulation.
     let Bounds { upper, lower } = Bounds::of_file(&readings.value);
     let special = [Some(low), Some(high), Some(0.0), upper, lower];
@@ -112,17 +115,23 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     };
     let sticks = long.iter().any(|run| !is_special(run) && is_proved(run));
     let repeated = long.into_iter().filter(|_| sticks).map(|run| run.start + 1..run.end);
-    let faulty: Vec<Range<usize>> = jumped.iter().cloned().chain(lost).chain(repeated).collect();
+    let faulty: Vec<Range<usize>> =
+        dropped.into_iter().chain(jumped.iter().cloned()).chain(lost).chain(repeated).collect();
     let mut is_faulty = vec![false; rows.len()];
     faulty.iter().for_each(|run| is_faulty[run.clone()].fill(true));
     (!faulty.is_empty()).then(|| (0..rows.len()).filter(|&row| !is_faulty[row]).collect())
 }
 
 impl Readings {
-    /// `None` if too few of them are free to say how the others behave.
-    fn of(value: Vec<f64>, voltage: Vec<f64>, rounding: f64, runs: &[Range<usize>]) -> Option<Self> {
+    /// Of all readings, those in `tied` ranges not being free; `None` if too few of them are free to say how the others behave.
+    fn of<'r>(
+        value: Vec<f64>,
+        voltage: Vec<f64>,
+        rounding: f64,
+        tied: impl Iterator<Item = &'r Range<usize>>,
+    ) -> Option<Self> {
         let mut free = vec![true; value.len()];
-        runs.iter().filter(|run| run.len() >= FEWEST_TIES.count()).for_each(|run| free[run.clone()].fill(false));
+        tied.for_each(|run| free[run.clone()].fill(false));
         let neighbours = (1..value.len()).filter(|&row| free[row - 1] && free[row]);
         let mut changes: Vec<f64> = neighbours.map(|row| (value[row] - value[row - 1]).abs()).collect();
         if changes.len() < FEWEST_NEW.max(value.len() / 2) {
@@ -319,6 +328,31 @@ fn runs(rows: usize, continues: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     starts.iter().zip(ends).map(|(&start, end)| start..end).collect()
 }
 
+/// Returns the runs of the lowest or the highest reading, short ones as well, if the readings jump to each and back from it by more than
+/// they change anywhere else, and at least [`FEWEST_TIES`] of them have two rows or more while the voltage rests: those of a contact that is
+/// lost for a few rows. The code of single failed readings makes outliers.
+fn dropouts(value: &[f64], voltage: &[f64], runs: &[Range<usize>], rounding: f64) -> Vec<Range<usize>> {
+    let [low, high] = range(value);
+    let [least, most] = range(voltage);
+    let rests = |run: &&Range<usize>| {
+        let [low, high] = range(&voltage[run.start.saturating_sub(MARGIN)..(run.end + MARGIN).min(value.len())]);
+        high - low <= CHANGE * (most - least)
+    };
+    let change = |row: &usize| (value[*row] - value[row - 1]).abs();
+    let at = |extreme: f64| -> Vec<Range<usize>> {
+        runs.iter().filter(|run| (value[run.start] - extreme).abs() <= rounding).cloned().collect()
+    };
+    let are_jumps = |of: &Vec<Range<usize>>| {
+        let ends: Vec<usize> =
+            of.iter().flat_map(|run| [run.start, run.end]).filter(|row| (1..value.len()).contains(row)).collect();
+        let smallest = ends.iter().map(change).fold(f64::INFINITY, f64::min);
+        let others = (1..value.len()).filter(|row| ends.binary_search(row).is_err());
+        of.iter().filter(rests).filter(|run| run.len() > 1).count() >= FEWEST_TIES.count()
+            && smallest > others.map(|row| change(&row)).fold(0.0, f64::max)
+    };
+    [low, high].map(at).into_iter().find(are_jumps).unwrap_or_default()
+}
+
 /// Returns the least length of the runs of a stuck sensor, all others being far shorter and fewer than would make one by chance.
 fn shortest_stuck(runs: &[Range<usize>]) -> Option<usize> {
     let mut lengths: Vec<usize> = runs.iter().map(Range::len).collect();
@@ -329,7 +363,7 @@ fn shortest_stuck(runs: &[Range<usize>]) -> Option<usize> {
         let part = repeats.max(1) as f64 / rows;
         let by_chance = 1.0 + (BY_CHANCE / rows).ln() / part.ln();
         let least = SHORTEST_RUN.get().max(longest as f64 / OTHERS).max(by_chance).ceil() as usize;
-        if part < LEAST_HELD.get() && length >= least {
+        if part < MOST_REPEATED.get() && length >= least {
             return Some(least);
         }
         (longest, repeats) = (length, repeats + length - 1);
@@ -412,6 +446,19 @@ mod tests {
         record.rows[612].measured = Some(between);
         let held = held_in(record, &[[450, 470]], Some(between));
         assert_eq!(stuck_in(&held).map(|stuck| stuck.rows), Some(rows_of(&[[450, 470]])));
+    }
+
+    #[test]
+    fn a_contact_that_is_lost_for_two_rows_again_and_again_is_loose() {
+        let runs = [[450, 452], [752, 754], [905, 906], [1350, 1352]];
+        let stuck = stuck_in(&held_in(noisy(), &runs, Some(-600.0))).unwrap();
+        assert_eq!(stuck.rows, rows_of(&runs));
+        // Twice is chance, single rows are outliers, and a pulse of the voltage is no fault.
+        assert_eq!(stuck_in(&held_in(noisy(), &runs[..2], Some(-600.0))), None);
+        assert_eq!(stuck_in(&held_in(noisy(), &runs.map(|[from, _]| [from, from + 1]), Some(-600.0))), None);
+        let mut pulses = held_in(noisy(), &runs, Some(-600.0));
+        runs.iter().for_each(|&[from, to]| pulses.rows[from..to].iter_mut().for_each(|row| row.voltage_v = -600.0));
+        assert_eq!(stuck_in(&pulses), None);
     }
 
     #[test]

@@ -66,9 +66,10 @@ thresholds! {
     COARSE = 2.0, "scales of the noise";
     /// Truncation instead of rounding is considered from this size of a step.
     LEAST_TRUNCATION = 0.5, "scales of the noise";
-    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held, and beside which no
-    /// longer run is that of a stuck sensor.
-    LEAST_HELD = 0.15, "of the readings";
+    /// Smallest part of the readings that repeat the one before, from which they are examined for having been held.
+    LEAST_HELD = 0.05, "of the readings";
+    /// Part of the readings that repeat the one before, beside which no longer run is that of a stuck sensor.
+    MOST_REPEATED = 0.15, "of the readings";
     /// Readings of which more return to the one before last are on a grid, and not held.
     MOST_RETURNS = 0.02, "of the new readings";
     /// Readings on a grid with a larger step repeat because of it, and are not held.
