@@ -66,8 +66,10 @@ pub(crate) fn search(
         let root = search.root();
         let engine = search.evaluator();
         let as_identified = engine.fit_twice(Model { relaxation: Vec::new(), ..best.fit.model.clone() });
-        let mut predicted = held_out(engine, &best.fit);
-        let kept = held_out(engine, &as_identified);
+        // No other segment tells where a cause that acts in a part of the record begins.
+        let in_place = |engine: &mut Engine, fit: &Fit| error(&engine.held_out_residual_in_place(fit));
+        let mut predicted = in_place(engine, &best.fit);
+        let kept = in_place(engine, &as_identified);
         if kept <= AS_GOOD * predicted {
             (best.fit, predicted) = (as_identified, kept);
         }
