@@ -16,8 +16,8 @@ use simulation::schedule::{Between, Schedule};
 
 /// Rate of the tick, in Hz.
 const RATE_HZ: f64 = 1000.0;
-/// Duration of a record, in s of the tick's clock, from which it is not run tick by tick.
-const LONGEST_TICKED_S: f64 = 5000.0;
+/// Number of ticks from which a record is not run tick by tick, because that would take as long as the search.
+const MOST_TICKS: f64 = 5e6;
 /// Error of the tick, in normalised V, above which reports point it out: 0.002 of the reference voltage.
 pub const SMALL_ERROR_V: f64 = 1.0;
 
@@ -28,7 +28,8 @@ pub struct Export {
     pub file: PlantFile,
     /// Largest absolute difference between the fixed-point tick with this file and the fitted spring, in V. Both start at
     /// rest and receive the voltages of the fitted amplifier at the record's rows, each held until the next; effects that the
-    /// file lists as not modelled are in neither. `None` if the tick rejects the file, or the record's voltage is not held.
+    /// file lists as not modelled are in neither. `None` if the tick rejects the file, the record's voltage is not held, or the
+    /// record lasts longer than 5000 s.
     pub fixed_point_error_v: Option<f64>,
     /// Lowest and highest voltage at which the record shows a nonlinear static law, in normalised V; `None` without one.
     pub law_range_v: Option<[f64; 2]>,
@@ -47,7 +48,7 @@ pub(crate) fn export(engine: &Engine, model: &Model, reading_map: Option<[f64; 2
     }
     let tick_refuses = file.check().err().map(|error| error.to_string());
     let duration_s = data.scales().restored(Dimension::Time, data.duration_s());
-    let runs = held && duration_s < LONGEST_TICKED_S && tick_refuses.is_none();
+    let runs = held && duration_s * RATE_HZ < MOST_TICKS && tick_refuses.is_none();
     let fixed_point_error_v = runs.then(|| tick_error(model, base, data, &file)).flatten();
     let law = index_of("static-nonlinearity").filter(|law| model.has(*law));
     let law_range_v = law.map(|_| model.known_law(base, data)).map(|range| [range.low, range.high]);
