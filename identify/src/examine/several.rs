@@ -191,10 +191,9 @@ fn of_each(
     options: &Options,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<Normalised>> {
-    let spring = PlantFile { unmodelled: None, ..joint.plant.clone() };
     let plant = "the spring with the shared causes".to_owned();
     // What no plant file holds is found again in each record.
-    let base = Base::new(spring).unwrap_or_else(|_| options.base.clone());
+    let base = spring(joint).unwrap_or_else(|| options.base.clone());
     let options = Options { plant, base, zero_unknown: true, ..options.clone() };
     let alone = |(record, offset): (&Record, &f64)| {
         let from_zero = Record { rows: record.rows.iter().map(|row| row.less(*offset)).collect(), ..record.clone() };
@@ -212,11 +211,16 @@ fn predicts_most_records_better(one: &Diagnosis, other: &Diagnosis) -> bool {
     2 * better > parts.len()
 }
 
+/// The extended spring without what no plant file holds; `None` if it is no spring that can be simulated.
+fn spring(joint: &Diagnosis) -> Option<Base> {
+    Base::new(PlantFile { unmodelled: None, ..joint.plant.clone() }).ok()
+}
+
 /// True if the extended spring, as a plant file, holds a cause that all records share.
 fn is_in_spring(joint: &Diagnosis, cause: &str) -> bool {
     let is_in_model = index_of(cause).is_some_and(|effect| joint.extended.model.has(effect));
     let is_unmodelled = joint.plant.unmodelled.as_ref().is_some_and(|causes| causes.contains_key(cause));
-    is_in_model && !is_unmodelled
+    is_in_model && !is_unmodelled && spring(joint).is_some()
 }
 
 /// What is found in one record beyond the causes that all records share. One that the extended spring holds is found in a record again
