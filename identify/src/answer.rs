@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 
 use crate::dimension::Dimension;
 use crate::hypotheses::{Experiment, Rival};
+use crate::stats::thresholds::probability::RIVAL_ODDS;
 
 /// Version of the JSON format.
 pub const SCHEMA: u32 = 1;
@@ -23,7 +24,7 @@ pub struct Report {
     pub verdict: Verdict,
     /// The simulation as it is given.
     pub nominal: Nominal,
-    /// Its errors.
+    /// Errors of the simulation as it is given.
     pub baseline: Quality,
     /// Named causes, the one that explains the largest mean square error first.
     pub findings: Vec<Finding>,
@@ -35,7 +36,8 @@ pub struct Report {
     /// Smallest errors that would have been found; `None` if something was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub would_show: Option<Margins>,
-    /// Other sets of causes that the record cannot reject.
+    /// Other sets of causes that the record cannot reject, or that are left if a law that no cause describes is in place of a finding
+    /// ([`Report::rejects`]).
     pub alternatives: Vec<Vec<&'static str>>,
     /// The experiment that would decide between the alternatives or show more, in one sentence.
     pub next_experiment: Option<String>,
@@ -65,6 +67,17 @@ pub struct Report {
     pub experiment: Option<Experiment>,
 }
 
+impl Report {
+    /// Returns true if the readings themselves reject a set of causes, which is then an alternative only because a law that no cause
+    /// describes may be in place of a finding that it lacks; false for a set that was not fitted.
+    pub fn rejects(&self, set: &[&str]) -> bool {
+        let is_it = |rival: &&Rival| {
+            rival.causes.len() == set.len() && rival.causes.iter().all(|cause| set.contains(&cause.as_str()))
+        };
+        self.rivals.iter().find(is_it).is_some_and(|rival| rival.nats < -RIVAL_ODDS)
+    }
+}
+
 /// What one of several records shows beyond the causes that they share.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordReport {
@@ -72,11 +85,11 @@ pub struct RecordReport {
     pub name: String,
     /// Number of rows with a reading.
     pub rows: usize,
-    /// Zero offset of the record, in V.
+    /// Zero offset of the record, in the reading's unit.
     pub offset: f64,
-    /// Scale of the innovations of its noise, in V.
+    /// Scale of the innovations of its noise, in the reading's unit.
     pub sigma: f64,
-    /// Root mean square error with the shared causes and its own findings, in V.
+    /// Root mean square error with the shared causes and its own findings, in the reading's unit.
     pub rmse: f64,
     /// The conclusion on this record, against the spring with the shared causes.
     pub verdict: Verdict,
@@ -95,7 +108,7 @@ pub struct LinearError {
     pub rmse: f64,
     /// Held-out root mean square error, in the reading's unit.
     pub held_out_rmse: f64,
-    /// The same on the last 40 % of each record, by a fit to the first 60 %.
+    /// Root mean square error on the last 40 % of each record by a fit to its first 60 %, in the reading's unit.
     pub last_40_percent_rmse: f64,
 }
 
@@ -119,7 +132,7 @@ pub struct Equation {
     /// By how much its log-likelihood on these segments exceeds that of the extended simulation, in nats, under the law of its own
     /// noise.
     pub nats_over_extended: f64,
-    /// The same over the best linear model.
+    /// By how much its log-likelihood on these segments exceeds that of the best linear model, in nats.
     pub nats_over_linear: f64,
     /// The equation as a plant file, if the tick simulates all of it.
     pub plant: Option<String>,
@@ -187,7 +200,7 @@ pub struct Quality {
 /// The simulation extended by the named causes.
 #[derive(Clone, Debug, Serialize)]
 pub struct Extended {
-    /// Its errors.
+    /// Errors of the extended simulation.
     #[serde(flatten)]
     pub quality: Quality,
     /// Held-out improvement, `1 - extended / baseline` of the root mean square errors; 0 without findings.

@@ -184,7 +184,7 @@ def test_a_table_shows_what_is_open_and_no_name_gets_through(diagnosis):
         "<b>ambiguous</b>",
         "&lt;b&gt; in &lt;i&gt;.csv only",
         "The search was stopped",
-        "cannot reject: no error at all; drift with hum.",
+        "Alternatives: no error at all; drift with hum.",
         "To decide, hold 300 V.",
         "Structure &amp; more.",
     ):

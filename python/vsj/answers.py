@@ -233,7 +233,7 @@ class Margins:
 
 @dataclass(frozen=True)
 class RecordReport:
-    """What one of several records shows beyond the causes that they share."""
+    """What one of several records shows beyond the causes that they share; offset, sigma and rmse are in the reading's unit."""
 
     name: str
     rows: int

@@ -24,7 +24,7 @@ def diagnosis_html(it):
         said.append(escape(f"Suspects, no findings: {', '.join(suspect.cause for suspect in it.suspects)}."))
     if it.alternatives:
         sets = "; ".join(" with ".join(causes) or "no error at all" for causes in it.alternatives)
-        said.append(escape(f"Alternatives that the data cannot reject: {sets}."))
+        said.append(escape(f"Alternatives: {sets}."))
     if it.leftover:
         said.append(escape(f"{it.leftover}."))
     if it.next_experiment:

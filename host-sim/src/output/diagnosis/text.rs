@@ -231,6 +231,9 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
                 margins.map_or_else(String::new, |off| format!(", in which {off} would have been detected"))
             )
         }
+        Verdict::Insufficient if report.leftover.is_some() && report.would_show.is_none() => {
+            format!("{name} cannot decide whether the simulation is wrong.")
+        }
         Verdict::Insufficient => format!(
             "{name} cannot decide whether the simulation is wrong: its {rows} readings have too little excitation{}.",
             margins.map_or_else(String::new, |off| format!("; {off} could remain undetected"))
@@ -240,6 +243,9 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
                 "The simulation agrees with {name} together, but more than one answer fits what single records show."
             )
         }
+        Verdict::Unexplained if causes.is_empty() && !report.search.finished => {
+            format!("The simulation is wrong on {name}, and no cause that was tried explains it.")
+        }
         Verdict::Unexplained if causes.is_empty() => {
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
@@ -248,9 +254,11 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             format!("The simulation is wrong on {name}; {} {explain} only a part of the error.", causes.join(", "))
         }
         Verdict::Ambiguous | Verdict::Explained => {
+            let is_coarse = report.findings.iter().all(|finding| finding.cause == "quantisation");
             let what = match (in_readings, report.alternatives.iter().any(Vec::is_empty)) {
                 (false, false) => format!("The simulation is wrong on {name}"),
                 (false, true) => format!("The simulation may be wrong on {name}"),
+                (true, false) if is_coarse => format!("The readings of {name} are coarse"),
                 (true, false) => format!("The readings of {name} are at fault"),
                 (true, true) => format!("The readings of {name} may be at fault"),
             };
@@ -286,25 +294,31 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             Some(value) => format!("with {}", probability(value)),
             None => format!("{:.1} nats short of a finding", suspect.nats_short),
         };
-        sentences.push(format!(
-            "The best suspect is {}, {distance}: it changes the error from {} to {} {unit}.",
-            suspect.cause,
-            number(suspect.rmse_before),
-            number(suspect.rmse_after)
-        ));
+        let (before, after) = (number(suspect.rmse_before), number(suspect.rmse_after));
+        let error = match suspect.rmse_after < suspect.rmse_before {
+            true => format!("it changes the error from {before} to {after} {unit}"),
+            false => format!("it does not lower the error, {before} {unit} without it and {after} {unit} with it"),
+        };
+        sentences.push(format!("The best suspect is {}, {distance}: {error}.", suspect.cause));
     }
     if !report.alternatives.is_empty() {
         let is_right = report.baseline.rmse <= HARDLY_LARGER * report.extended.quality.rmse;
         let nothing =
             || if is_right { "no error at all".to_owned() } else { "a law that no cause describes".to_owned() };
-        let rivals = report.alternatives.iter().map(|set| if set.is_empty() { nothing() } else { set.join(" with ") });
-        sentences.push(format!("Alternatives that the data cannot reject: {}.", rivals.collect::<Vec<_>>().join("; ")));
-        let unlikely = report.findings.iter().filter(|finding| !finding.is_likely()).map(|finding| finding.cause);
-        let unlikely: Vec<&str> = unlikely.collect();
-        if !unlikely.is_empty() {
+        let name = |set: &Vec<&str>| if set.is_empty() { nothing() } else { set.join(" with ") };
+        let (rejected, open): (Vec<_>, Vec<_>) = report.alternatives.iter().partition(|set| report.rejects(set));
+        if !open.is_empty() {
+            let open: Vec<String> = open.into_iter().map(name).collect();
+            sentences.push(format!("Alternatives that the data cannot reject: {}.", open.join("; ")));
+        }
+        let lacks = |finding: &&Finding| rejected.iter().any(|set| !set.contains(&finding.cause));
+        let doubtful = |finding: &&Finding| !finding.is_likely() || lacks(finding);
+        let doubtful: Vec<&str> = report.findings.iter().filter(doubtful).map(|finding| finding.cause).collect();
+        if !doubtful.is_empty() {
             sentences.push(format!(
-                "Less likely true than not: {}; a law that no cause describes may be in its place.",
-                unlikely.join(", ")
+                "Not certain enough: {}; a law that no cause describes may be in {} place.",
+                doubtful.join(", "),
+                if doubtful.len() == 1 { "its" } else { "their" }
             ));
         }
     }
@@ -318,7 +332,8 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         ));
     }
     if let Some(leftover) = &report.leftover {
-        let small = if report.verdict == Verdict::Unexplained { "" } else { "Too small to change this verdict: " };
+        let decides = report.verdict == Verdict::Unexplained || report.verdict == Verdict::Insufficient;
+        let small = if decides { "" } else { "Too small to change this verdict: " };
         sentences.push(format!("{small}{leftover}."));
     }
     match (another_spring(report), &report.next_experiment) {
@@ -343,6 +358,7 @@ fn row(text: &mut String, finding: &Finding, scales: &Scales) {
 mod tests {
     use super::*;
     use identify::answer::{NoiseReport, ResidualReport, SCHEMA};
+    use identify::hypotheses::Rival;
     use simulation::units::Units;
 
     /// The first two sentences about causes that do not reduce the error.
@@ -463,6 +479,25 @@ mod tests {
         );
         report.nominal.plant = "identify".into();
         assert_eq!(last(&report), "To decide, run the same schedule again.");
+    }
+
+    #[test]
+    fn a_set_that_the_readings_reject_is_no_alternative_that_they_cannot_reject() {
+        let mut report = report(Verdict::Ambiguous, &["gain-error", "drift"], &[vec!["gain-error"], vec!["hum"]]);
+        let rival = |cause: &str, nats| Rival {
+            causes: vec![cause.into()],
+            nats,
+            parameters: Default::default(),
+            blocks: Vec::new(),
+            covariance: Vec::new(),
+        };
+        report.rivals = vec![rival("gain-error", -14_120.0), rival("hum", -2.0)];
+        let said = sentences("r.csv", &report, &Scales::default());
+        assert_eq!(said[said.len() - 2], "Alternatives that the data cannot reject: hum.");
+        assert!(
+            said[said.len() - 1].starts_with("Not certain enough: drift; a law that no cause describes"),
+            "{said:?}"
+        );
     }
 
     #[test]
