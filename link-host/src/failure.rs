@@ -32,6 +32,8 @@ pub enum Failure {
     },
     /// The program was asked to end while the MCU did not answer.
     Interrupted,
+    /// What was to be sent is longer than a block of the MCU's flash.
+    TooLong(&'static str),
     /// The MCU's settings are of a format that this program does not know.
     UnknownSettings,
     /// The port failed.
@@ -56,6 +58,9 @@ impl fmt::Display for Failure {
             }
             Self::NoAnswer { tries, bytes } => {
                 write!(f, "no valid answer to {tries} requests, but {bytes} bytes; is the baud rate right?")
+            }
+            Self::TooLong(what) => {
+                write!(f, "not sent: {what} would be longer than a block of the MCU's flash")
             }
             Self::NotRun {
                 what,

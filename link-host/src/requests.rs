@@ -47,8 +47,7 @@ impl Client {
     /// # Errors
     /// [`Failure`]; if the model is rejected, the old one stays. [`Failure::NotRun`] if another one runs.
     pub fn install(&mut self, model: &WireModel) -> Result<Blocks, Failure> {
-        // An oversized payload is not sent; the MCU then rejects the model as incomplete.
-        self.send(Block::Model, &model.payload().unwrap_or_default())
+        self.send(Block::Model, &model.payload().ok_or(Failure::TooLong("the model"))?)
     }
 
     /// The settings that run now, and those stored for the next start.
@@ -89,7 +88,7 @@ impl Client {
     /// # Errors
     /// [`Failure`]; if the settings are rejected, the old ones stay. [`Failure::NotRun`] if others run.
     pub fn install_settings(&mut self, settings: &WireSettings) -> Result<Blocks, Failure> {
-        let payload = settings.payload().unwrap_or_default();
+        let payload = settings.payload().ok_or(Failure::TooLong("the settings"))?;
         let blocks = self.send(Block::Settings, &payload)?;
         let running = self.read_settings(false)?;
         if running.payload().is_none_or(|running| running != payload) {

@@ -290,9 +290,13 @@ impl Port {
             self.needs.closing.store(true, Ordering::Relaxed);
             let beating = lock(&self.beating).take()?;
             beating.thread().unpark();
-            let failure = beating.join().unwrap_or_default();
+            let ended = beating.join();
             let connection = lock(&self.connection).take()?;
-            failure.map(|failure| not_disarmed(&connection.name(), &failure.to_string(), &connection.status))
+            let failure = match ended {
+                Ok(failure) => failure?.to_string(),
+                Err(_) => "the thread of the heartbeats failed".to_owned(),
+            };
+            Some(not_disarmed(&connection.name(), &failure, &connection.status))
         })
     }
 }
