@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use cpu_time::ThreadTime;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -126,6 +126,9 @@ pub struct Row {
     threshold: Threshold,
 }
 
+/// In place of the verdict of a diagnosis that failed.
+const REJECTED: &str = "rejected";
+
 /// Number of diagnoses of [`run`].
 pub fn diagnoses(cases: &[Case]) -> usize {
     (1 + 2 * THRESHOLDS.len()) * cases.len()
@@ -135,7 +138,7 @@ pub fn diagnoses(cases: &[Case]) -> usize {
 /// Returns the counts as they are, and those of each threshold.
 ///
 /// # Errors
-/// A report has another form than documented.
+/// A diagnosis fails with all thresholds as they are set, or a report has another form than documented.
 pub fn run(
     cases: &[Case],
     vary: fn(Option<(Threshold, f64)>),
@@ -143,6 +146,9 @@ pub fn run(
     progress: &ProgressBar,
 ) -> Result<(Counts, Vec<Row>)> {
     let (as_set, time) = answers(cases, diagnose, progress)?;
+    if let Some(case) = as_set.iter().position(|answer| answer.verdict == REJECTED) {
+        bail!("record {case} of {}: its diagnosis fails with all thresholds as they are set", cases.len());
+    }
     let at = |threshold: Threshold, factor: f64| {
         vary(Some((threshold, factor)));
         let result = answers(cases, diagnose, progress);
@@ -164,7 +170,7 @@ fn answers(cases: &[Case], diagnose: &Diagnose<'_>, progress: &ProgressBar) -> R
         let time = start.elapsed();
         progress.inc(1);
         let Ok(Ok(report)) = report else {
-            return Ok((Answer { verdict: "rejected".to_owned(), found: Vec::new() }, time));
+            return Ok((Answer { verdict: REJECTED.to_owned(), found: Vec::new() }, time));
         };
         let Report { verdict, findings, .. } = serde_json::from_value(report)?;
         Ok((Answer { verdict, found: findings.into_iter().map(|finding| finding.cause).collect() }, time))
