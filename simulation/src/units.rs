@@ -61,6 +61,10 @@ const READINGS: &[&str] = &[
     "g", "kg",
 ];
 
+/// Further units above or below the line of a quotient.
+const PARTS: &[&str] =
+    &["ft", "m2", "cm2", "mm2", "s2", "m3", "cm3", "mm3", "ft3", "l", "L", "ml", "mL", "gal", "mol", "J", "kJ", "rev"];
+
 /// The name of a unit of voltage, as [`Unit::of_voltage`] knows it, in its usual spelling; `None` for any other unit.
 pub(crate) fn usual_volts(name: &str) -> Option<String> {
     let prefix = name.strip_suffix(['V', 'v'])?;
@@ -76,6 +80,24 @@ pub(crate) fn usual_reading(name: &str) -> bool {
 /// True for the name of a usual unit of time, voltage or readings.
 pub fn is_usual(name: &str) -> bool {
     Unit::of_time(name).is_ok() || usual_volts(name).is_some() || usual_reading(name)
+}
+
+/// The name of a unit above or below the line of a quotient; `None` for a word that is none.
+pub(crate) fn part_of_quotient(unit: &str) -> Option<String> {
+    usual(unit).or_else(|| PARTS.contains(&unit).then(|| unit.to_owned()))
+}
+
+/// The name of a usual unit of time, voltage or reading; `None` for a word that is none.
+pub(crate) fn usual(unit: &str) -> Option<String> {
+    // A header in capitals: `TIME_MS`. A single capital is another unit.
+    let lower = if unit.len() > 1 { unit.to_lowercase() } else { unit.to_owned() };
+    let time = Unit::of_time(unit).or_else(|_| Unit::of_time(&lower)).ok().map(|unit| unit.name);
+    time.or_else(|| usual_volts(unit)).or_else(|| usual_reading(unit).then(|| unit.to_owned()))
+}
+
+/// The name of the unit of a quotient: `mm/V`, `percent/(ft3/min)`.
+pub fn quotient(above: &str, below: &str) -> String {
+    if below.contains(['/', ' ']) { format!("{above}/({below})") } else { format!("{above}/{below}") }
 }
 
 /// True for a cell that holds a unit and nothing else: a usual one, or any in brackets.
@@ -181,6 +203,7 @@ mod tests {
         assert_eq!(Unit::of_voltage("%").si, 1.0);
         assert_eq!(["kV", "V", "A"].map(|name| Unit::of_voltage(name).is_voltage()), [true, true, false]);
         assert_eq!(names.other_command(), None);
+        assert_eq!([quotient("mm", "V"), quotient("N/m", "ft3/min")], ["mm/V", "N/m/(ft3/min)"]);
         let heater = UnitNames { voltage: Some("%".into()), ..names };
         assert_eq!(heater.other_command(), Some("%"));
         assert!(Unit::of_time("parsec").unwrap_err().to_string().contains("expected ns, us, ms, s, min, h or d"));

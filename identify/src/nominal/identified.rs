@@ -2,7 +2,7 @@
 
 use simulation::plant_file::PlantFile;
 use simulation::record::Record;
-use simulation::units::Units;
+use simulation::units::{Units, quotient};
 
 use crate::answer::SCHEMA;
 use crate::linear::{Section, Series};
@@ -81,7 +81,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         Quantity { value, low: least - half, high: most + half, unit: unit.into() }
     };
     // In the order of `Canonical::values`.
-    let gain = quantity(canonical.gain, &format!("{reading}/{base}"));
+    let gain = quantity(canonical.gain, &quotient(reading, base));
     let share = quantity(canonical.share, "");
     let delay = quantity(canonical.delay, "s");
     let mut tau_s: Vec<TimeConstant> = canonical

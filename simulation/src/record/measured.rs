@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::columns;
 use super::gaps::{median_interval, missed_turns};
-use super::names::{Column, ColumnNames, Columns, usual};
+use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time, is_stamp};
 use super::{MOST_READING, MOST_V, Record, Row};
 use crate::bad_input;
@@ -14,7 +14,7 @@ use crate::bad_input::{BadInput, excerpt, number};
 use crate::csv_table::dialect::{Decimal, Dialect, Separator};
 use crate::csv_table::text::Source;
 use crate::csv_table::{Numbering, Table};
-use crate::units::{Unit, Units, are_labels, usual_volts};
+use crate::units::{Unit, Units, are_labels, usual, usual_volts};
 
 /// How to read a file with a measured record; everything that is not said is found in the file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use super::{APPLIED, ESTIMATE, MEASURED};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt};
 use crate::csv_table::{Table, plain};
-use crate::units::{Unit, usual_reading, usual_volts};
+use crate::units::{Unit, part_of_quotient, usual, usual_volts};
 
 /// The columns of a record as a user names them, `NAME` or `NAME:UNIT`; those without a name are recognised.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -237,6 +237,9 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
             return (base.trim_end_matches([' ', '_']), Some(usual(unit.trim()).unwrap_or(unit.trim().to_owned())));
         }
     }
+    if let Some(split) = split_quotient(name) {
+        return split;
+    }
     for (mark, at) in [('_', name.find('_')), ('_', name.rfind('_')), ('/', name.find('/')), (' ', name.rfind(' '))] {
         let Some(at) = at.filter(|at| *at > 0) else { continue };
         let unit = name[at + 1..].trim();
@@ -252,6 +255,28 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
     (name, None)
 }
 
+/// Splits a name that ends in a quotient of units, `v_m_per_s`, `flow l per min`, `omega_rad/s`, whose last word alone is not its
+/// unit. Without a unit where the beginning of the quotient is not known; `None` for any other name.
+fn split_quotient(name: &str) -> Option<(&str, Option<String>)> {
+    let lower = name.to_ascii_lowercase();
+    let per = lower.rfind("_per_").or_else(|| lower.rfind(" per "));
+    let (above, below) = match per {
+        Some(at) => (&name[..at], &name[at + "_per_".len()..]),
+        // `x/mm` is the quotient of a quantity and its unit.
+        None => name.rsplit_once('/').filter(|(_, below)| Unit::of_time(below).is_ok())?,
+    };
+    let (base, unit) = above.rsplit_once(['_', ' ']).unwrap_or(("", above));
+    if below.contains(['_', ' ', '/']) || (per.is_none() && unit == "A") {
+        return None;
+    }
+    let has_base = !base.is_empty() && !base.to_ascii_lowercase().ends_with("per");
+    match part_of_quotient(unit).zip(part_of_quotient(below)) {
+        Some((unit, below)) if has_base => Some((base.trim_end(), Some(format!("{unit}/{below}")))),
+        None if per.is_none() => None,
+        _ => Some((name, None)),
+    }
+}
+
 /// Returns the name of a column that says its unit: the name itself where it does, or where the unit is the one that is taken
 /// without a word, else `NAME [UNIT]`.
 pub fn with_unit(name: &str, unit: &str) -> String {
@@ -260,14 +285,6 @@ pub fn with_unit(name: &str, unit: &str) -> String {
     let is_said = own.is_some() && own == Some(usual(unit).unwrap_or_else(|| unit.to_owned()));
     let is_default = [MEASURED, ESTIMATE].contains(&name) && usual_volts(unit).as_deref() == Some("V");
     if unit.is_empty() || is_said || is_default { name.to_owned() } else { format!("{name} [{unit}]") }
-}
-
-/// The name of a usual unit of time, voltage or reading; `None` for a word that is none.
-pub(super) fn usual(unit: &str) -> Option<String> {
-    // A header in capitals: `TIME_MS`. A single capital is another unit.
-    let lower = if unit.len() > 1 { unit.to_lowercase() } else { unit.to_owned() };
-    let time = Unit::of_time(unit).or_else(|_| Unit::of_time(&lower)).ok().map(|unit| unit.name);
-    time.or_else(|| usual_volts(unit)).or_else(|| usual_reading(unit).then(|| unit.to_owned()))
 }
 
 #[cfg(test)]
@@ -302,6 +319,25 @@ mod tests {
             ("Time s", "Time", Some("s")),
             ("Q1", "Q1", None),
             ("[mm]", "[mm]", None),
+            ("gas_ft3_per_min", "gas", Some("ft3/min")),
+            ("v_m_per_s", "v", Some("m/s")),
+            ("feed_mm_per_s", "feed", Some("mm/s")),
+            ("OMEGA_rad_PER_SEC", "OMEGA", Some("rad/s")),
+            ("p_bar_per_s", "p", Some("bar/s")),
+            ("gain_um_per_V", "gain", Some("um/V")),
+            ("Flow l per min", "Flow", Some("l/min")),
+            ("omega_rad/s", "omega", Some("rad/s")),
+            ("Flow l/min", "Flow", Some("l/min")),
+            ("t_rel/s", "t_rel", Some("s")),
+            ("phase_A/s", "phase_A", Some("s")),
+            ("co2_percent", "co2", Some("percent")),
+            ("force_per_area_Pa", "force_per_area", Some("Pa")),
+            // The beginning of the unit is not known.
+            ("flow_rate_per_min", "flow_rate_per_min", None),
+            ("x_m_per_s_per_min", "x_m_per_s_per_min", None),
+            ("clicks_per_s", "clicks_per_s", None),
+            ("m_per_s", "m_per_s", None),
+            ("mm/s", "mm/s", None),
         ] {
             assert_eq!(split_unit(name), (base, unit.map(str::to_owned)), "{name}");
         }

@@ -8,6 +8,7 @@ use identify::effects::effect::Location;
 use identify::effects::{EFFECTS, index_of};
 use identify::record::scales::Scales;
 use identify::verdict::export::SMALL_ERROR_V;
+use simulation::units::quotient;
 
 use crate::output::diagnosis::equation;
 use crate::output::diagnosis::number::{interval, linear_name, number, probability, shown_name};
@@ -187,7 +188,7 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
         (1.0, 0.0) => String::new(),
         (gain, zero) => {
             let per = scales.units.voltage.si;
-            let unit = format!("{}/{}", scales.unit(Dimension::Reading), scales.unit(Dimension::Voltage));
+            let unit = quotient(&scales.unit(Dimension::Reading), &scales.unit(Dimension::Voltage));
             format!(
                 ", gain {} {unit}, zero {}",
                 significant(gain * per, 4),

@@ -2,7 +2,7 @@
 
 use identify::dimension::with_interval;
 use identify::nominal::report::{InputLaw, Quantity, Report};
-use simulation::units::Units;
+use simulation::units::{Units, quotient};
 
 use crate::output::diagnosis::number::number;
 
@@ -16,7 +16,7 @@ pub(super) fn quantities(report: &Report, units: &Units) -> Vec<Line> {
         [name, format!("{value} {unit}").trim_end().to_owned(), interval]
     };
     let (nominal, reading, time) = (&report.nominal, report.unit.as_str(), &units.time);
-    let per_voltage = format!("{reading}/{}", units.voltage.name);
+    let per_voltage = quotient(reading, &units.voltage.name);
     let mut lines = vec![line("gain".into(), &nominal.gain, 1.0 / units.voltage.si, &per_voltage)];
     if let [only] = report.start.as_slice() {
         lines.push(line("zero".into(), &only.zero, 1.0, reading));
