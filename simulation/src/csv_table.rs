@@ -201,6 +201,13 @@ impl<'a> Table<'a> {
         BadInput(format!("{place}: no column `{column}`; expected a header with {expected}, found `{found}`"))
     }
 
+    /// The error for a column that an option names for another quantity than the one that it already is.
+    pub(crate) fn is_taken(&self, index: usize, quantity: &str, option: &str) -> BadInput {
+        let column = excerpt(self.column(index)).replace(['\n', '\r'], " ");
+        let place = self.header_place();
+        BadInput(format!("{place}: column `{column}` is the {quantity}; expected another one for {option}"))
+    }
+
     /// Reads the next row; `None` after the last.
     ///
     /// # Errors

@@ -115,6 +115,12 @@ impl Record {
         let voltage = table.require("voltage_v", &expected)?;
         let measured = measured.map(|column| table.require(column, &expected)).transpose()?;
 
+        for (index, quantity) in [(time, "time"), (voltage, "voltage")] {
+            if measured == Some(index) {
+                return Err(table.is_taken(index, quantity, "--column").into());
+            }
+        }
+
         let name = table.name().to_owned();
         let mut rows: Vec<Row> = Vec::new();
         while let Some(row) = table.next_row()? {
@@ -170,6 +176,11 @@ mod tests {
         assert_eq!(gap.rows.iter().map(|row| row.measured).collect::<Vec<_>>(), [None, Some(-8.0)]);
         let error = Record::parse("r", text, "scale").unwrap_err().to_string();
         assert!(error.contains("no column `scale`; expected a header with time_s, voltage_v, scale"), "{error}");
+        for (column, quantity) in [("time_s", "time"), ("voltage_v", "voltage")] {
+            let error = Record::parse("r", text, column).unwrap_err().to_string();
+            let expected = format!("r, line 1: column `{column}` is the {quantity}; expected another one for --column");
+            assert_eq!(error, expected);
+        }
     }
 
     #[test]

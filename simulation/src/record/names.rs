@@ -85,6 +85,11 @@ impl ColumnNames {
         [&self.time, &self.voltage, &self.reading][role as usize].as_deref()
     }
 
+    /// The option that names the column of a quantity.
+    fn option(&self, role: Role) -> &'static str {
+        if role == Role::Reading && self.stiffness.is_some() { "--column" } else { role.option() }
+    }
+
     /// Finds the columns in a table: those that are asked for, else those of this program's records, else those whose names
     /// and units leave no choice.
     ///
@@ -123,12 +128,15 @@ impl ColumnNames {
             let name = asked(missing).map_or(missing.contract()[0], |(name, _)| name);
             return Err(self.lacks(table, name, &found).into());
         };
-        if voltage.index == time.index || (reading.index == time.index && self.stiffness.is_none()) {
-            let column = excerpt(table.column(time.index)).replace(['\n', '\r'], " ");
-            bad_input!(
-                "{}: column `{column}` is the time; expected another one for --voltage and --reading",
-                table.header_place()
-            );
+        let reading_option = self.option(Role::Reading);
+        for (taken, quantity, column, option) in [
+            (&time, "time", &voltage, "--voltage"),
+            (&time, "time", &reading, reading_option),
+            (&voltage, "voltage", &reading, reading_option),
+        ] {
+            if taken.index == column.index {
+                return Err(table.is_taken(taken.index, quantity, option).into());
+            }
         }
         Ok(Columns { time, voltage, reading })
     }
@@ -166,28 +174,37 @@ impl ColumnNames {
                 spec
             }
         };
-        let free: Vec<usize> = (0..table.columns().count()).filter(|index| !taken(*index)).take(MOST_COLUMNS).collect();
-        let fitting = |role: Role| {
-            free.iter().copied().filter(move |index| role.fits(split_unit(table.column(*index)).1.as_deref()))
-        };
+        let mut free: Vec<usize> =
+            (0..table.columns().count()).filter(|index| !taken(*index)).take(MOST_COLUMNS).collect();
+        let has_columns = !free.is_empty();
+        let missing = [Role::Voltage, Role::Reading].iter().filter(|role| found[**role as usize].is_none()).count();
         let options = Role::ALL.map(|role| {
-            let option = if role == Role::Reading && self.stiffness.is_some() { "--column" } else { role.option() };
             let choice = match &found[role as usize] {
                 Some(column) => self.of(role).map_or_else(|| spec(column.index, role), str::to_owned),
-                None => match fitting(role).map(|index| spec(index, role)).collect::<Vec<_>>().as_slice() {
-                    [] => "NAME:UNIT".to_owned(),
-                    [only] => only.clone(),
-                    several => format!("one of {}", several.join(", ")),
-                },
+                None => {
+                    let fits = |index: &usize| role.fits(split_unit(table.column(*index)).1.as_deref());
+                    let fitting: Vec<usize> = free.iter().copied().filter(fits).collect();
+                    // Where too few columns fit, the unit of one may have been mistaken.
+                    let are_enough = fitting.len() >= if role == Role::Time { 1 } else { missing };
+                    let candidates = if are_enough { fitting } else { free.clone() };
+                    if let [only] = candidates[..] {
+                        free.retain(|index| *index != only);
+                    }
+                    match candidates.iter().map(|index| spec(*index, role)).collect::<Vec<_>>().as_slice() {
+                        [] => "NAME:UNIT".to_owned(),
+                        [only] => only.clone(),
+                        several => format!("one of {}", several.join(", ")),
+                    }
+                }
             };
-            format!("{option} {choice}")
+            format!("{} {choice}", self.option(role))
         });
         let names = Role::ALL.map(|role| match (role, &self.stiffness) {
             (Role::Reading, Some(name)) => name,
             _ => self.of(role).unwrap_or(role.contract()[0]),
         });
         let names = names.join(", ");
-        table.lacks(name, &if free.is_empty() { names } else { format!("{names}, or {}", options.join(" ")) })
+        table.lacks(name, &if has_columns { format!("{names}, or {}", options.join(" ")) } else { names })
     }
 }
 
@@ -385,7 +402,19 @@ mod tests {
                 "start [h],end [h],u_V,x_mm\n",
                 "--time one of 'start [h]:h', 'end [h]:h' --voltage u_V:V --reading x_mm:mm",
             ),
-            ("T,drive [%],x_mm,F_N\n", "--time T --voltage one of T, 'drive [%]', x_mm, F_N --reading one of"),
+            (
+                "T,drive [%],x_mm,F_N\n",
+                "--time T --voltage one of 'drive [%]', x_mm, F_N --reading one of 'drive [%]:%', x",
+            ),
+            ("t_us,i_A,omega_rad/s\n", "--time t_us:us --voltage i_A --reading omega_rad/s:rad/s, found"),
+            (
+                "time_s,gas_ft3_per_min,co2_percent\n",
+                "--voltage one of gas_ft3_per_min, co2_percent --reading one of gas_ft3_per_min:ft3/min, co2_percent:percent",
+            ),
+            // A column is proposed for one quantity, and one with another's unit where no others are left.
+            ("time_s,x\n", "--time time_s:s --voltage x --reading NAME:UNIT, found"),
+            ("time_s,x,y_min\n", "--time time_s:s --voltage one of x, y_min --reading one of x, y_min, found"),
+            ("time_s,u_V,y_min\n", "--time time_s:s --voltage u_V:V --reading y_min, found"),
             ("time_s,voltage_v,strain\n", "no column `stiffness`"),
             (
                 "time_s,voltage_v,estimate\n",
@@ -420,7 +449,24 @@ mod tests {
         assert_eq!(found("time_s,voltage_v,x [mm]\n", &names("X")), Ok(without_unit.clone()));
         assert_eq!(found("time_s,voltage_v,x [m]\n", &names("x:mm")), Ok(without_unit));
         assert!(found("time_s,voltage_v,x [mm],x_N\n", &names("x")).unwrap_err().contains("no column `x`"));
-        let twice = ColumnNames { time: Some("a".into()), voltage: Some("a".into()), ..ColumnNames::default() };
-        assert!(found("a,b,stiffness\n", &twice).unwrap_err().contains("column `a` is the time; expected another"));
+    }
+
+    #[test]
+    fn a_column_is_one_quantity() {
+        let names = |time: &str, voltage: &str, reading: &str, stiffness: &str| {
+            let [time, voltage, reading, stiffness] =
+                [time, voltage, reading, stiffness].map(|name| (!name.is_empty()).then(|| name.to_owned()));
+            ColumnNames { time, voltage, reading, stiffness }
+        };
+        for (names, expected) in [
+            (names("a", "a", "", ""), "r, line 1: column `a` is the time; expected another one for --voltage"),
+            (names("a", "", "a:mm", ""), "r, line 1: column `a` is the time; expected another one for --reading"),
+            (names("a", "", "", "a"), "r, line 1: column `a` is the time; expected another one for --column"),
+            (names("a", "b", "b", ""), "r, line 1: column `b` is the voltage; expected another one for --reading"),
+            (names("a", "b:%", "B:mm", ""), "r, line 1: column `b` is the voltage; expected another one for --reading"),
+            (names("a", "u_V", "", "u_V"), "r, line 1: column `u_V` is the voltage; expected another one for --column"),
+        ] {
+            assert_eq!(found("a,b,u_V,stiffness\n", &names).unwrap_err(), expected);
+        }
     }
 }
