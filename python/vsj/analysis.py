@@ -33,7 +33,7 @@ def identify(
     data : path, pandas or polars DataFrame, mapping, array, tuple, or a list of these
         The record: the path of a CSV, MCAP or Parquet file, a frame or a mapping with named columns, a structured array, three arrays
         of shape ``(n,)`` in the order time, voltage, reading, or an array of shape ``(n, 3)``. A list holds several records of one
-        spring. NaN or null is a missing reading.
+        spring. NaN or null is a missing reading, in texts also what stands for one in a file, such as ``#N/A``.
     time, voltage, reading : str, optional
         Column and unit, ``"NAME"`` or ``"NAME:UNIT"``, as of the command's options ``--time``, ``--voltage``, ``--reading``.
         Default: found by usual names and units.

@@ -5,6 +5,7 @@ pub mod columns;
 pub mod columns_file;
 pub mod gaps;
 mod measured;
+mod missing;
 mod names;
 mod times;
 

@@ -403,6 +403,34 @@ fn a_mark_that_may_separate_thousands_is_asked_for() {
 }
 
 #[test]
+fn marks_of_spreadsheets_and_libraries_are_missing_readings_and_failed_ones_are_not() {
+    let reading = |cell: &str| read(format!("t_s;u_V;x_mm\n0;0;1\n1;0;{cell}\n"), &Format::default());
+    for cell in
+        ["", "-", "NaN", "nan", "-nan", "NA", "N/A", "n/a", "#N/A", "#NV", "<NA>", "null", "NULL", "None", "\"#N/A\""]
+    {
+        let read = reading(cell).unwrap_or_else(|error| panic!("{cell}: {error}"));
+        assert_eq!(read.record.rows[1].measured, None, "{cell}");
+        assert!(
+            read.remarks.contains(&"r.csv: 1 of 2 rows without a reading".to_owned()),
+            "{cell}: {:?}",
+            read.remarks
+        );
+    }
+    for cell in ["OVLD", "inf", "-Infinity", "#DIV/0!", "#REF!", "--"] {
+        assert_eq!(
+            reading(cell).unwrap_err(),
+            format!(
+                "r.csv, line 3, column x_mm: `{cell}` is not a finite number; a missing reading is an empty cell, `-`, NaN, NA, \
+                 N/A, #N/A, null or None"
+            )
+        );
+    }
+    assert!(reading("1e16").unwrap_err().ends_with("`1e16` is not a number from -1e15 to 1e15"));
+    let voltage = read("t_s;u_V;x_mm\n0;null;1\n", &Format::default()).unwrap_err();
+    assert_eq!(voltage, "r.csv, line 2, column u_V: `null` is not a finite number");
+}
+
+#[test]
 fn rows_of_separators_are_blank_lines() {
     let text = "t_s;u_V;x_mm\n0;0;1\n;;\n1;0;2\n;;\n;;\n";
     let rows = read(text, &Format::default()).unwrap().record.rows;

@@ -21,8 +21,8 @@ use super::record_arguments::RecordArguments;
 
 /// Find out how the simulation differs from measured data, name the cause, and measure the held-out improvement
 ///
-/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (as the equivalent static voltage in V, or -
-/// for a missing reading), or others that the options below name with their units. It must contain every change of the
+/// DATA.csv has the columns time_s, voltage_v (commanded) and stiffness (as the equivalent static voltage in V; nothing, -, NaN, NA,
+/// N/A, #N/A, null or None for a missing reading), or others that the options below name with their units. It must contain every change of the
 /// voltage. The voltage of a row applies from its time on, and its reading is taken just after, so that it includes the
 /// instantaneous part of a step to this voltage. If voltage_v is missing, applied_v is used, as written by
 /// `vsj stair --out`.

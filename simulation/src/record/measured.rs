@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use super::columns;
 use super::gaps::{median_interval, missed_turns};
+use super::missing::{self, is_missing};
 use super::names::{Column, ColumnNames, Columns};
 use super::times::{Clock, Time, is_stamp};
 use super::{MOST_READING, MOST_V, Record, Row};
@@ -310,11 +311,6 @@ fn below_header(table: &mut Table<'_>, columns: &Columns) -> Result<[Option<Stri
     Ok(units)
 }
 
-/// True for a cell that says that there is no reading.
-fn is_missing(text: &str) -> bool {
-    ["", "-", "nan", "na", "n/a"].iter().any(|missing| text.eq_ignore_ascii_case(missing))
-}
-
 /// The rows of a table in the order of the file, their times not yet in s.
 struct Rows<'a, 't> {
     table: &'a mut Table<'t>,
@@ -343,9 +339,7 @@ impl Rows<'_, '_> {
                 );
             }
             let voltage_v = row.number_within(voltage.index, most_voltage)? * unit.si;
-            let measured = (!is_missing(row.text(reading.index)))
-                .then(|| row.number_within(reading.index, MOST_READING))
-                .transpose()?;
+            let measured = missing::reading(&row, reading.index, MOST_READING)?;
             if let Some((last, Row { line, .. })) = rows.last()
                 && !self.sort
                 && !at.is_after(*last)
