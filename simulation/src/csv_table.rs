@@ -16,7 +16,7 @@ use csv::StringRecord;
 
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
-use dialect::{Dialect, Numbers, Separator, has_thousands_separators};
+use dialect::{Dialect, Numbers, Separator};
 use header::are_names;
 use stream::{Stream, unwrapped};
 use text::Source;
@@ -392,7 +392,6 @@ impl Row<'_> {
         if unclosed(text) {
             return BadInput(format!("{place}: {UNCLOSED}; expected {what}")).into();
         }
-        let hint = if has_thousands_separators(text) { " (without separators of thousands)" } else { "" };
-        BadInput(format!("{place}: `{}` is not {what}{hint}", excerpt(text))).into()
+        BadInput(format!("{place}: `{}` is not {what}{}", excerpt(text), self.numbers.hint(text))).into()
     }
 }

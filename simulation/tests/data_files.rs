@@ -403,6 +403,30 @@ fn a_mark_that_may_separate_thousands_is_asked_for() {
 }
 
 #[test]
+fn a_decimal_comma_in_quotes_between_commas_is_asked_for() {
+    let error = |cell: &str| {
+        let text = format!("t_s,u_V,x_mm\n\"0\",\"0\",\"{cell}\"\n");
+        let error = read(text, &Format::default()).unwrap_err();
+        error.strip_prefix("r.csv, line 2, column x_mm: ").expect("the place").to_owned()
+    };
+    for (cell, expected) in [
+        ("0,1", "`0,1` is not a finite number (a decimal comma where commas separate the columns needs --decimal ,)"),
+        (
+            "-12,5e3",
+            "`-12,5e3` is not a finite number (a decimal comma where commas separate the columns needs --decimal ,)",
+        ),
+        (
+            "1,200",
+            "`1,200` is not a finite number (without separators of thousands; a decimal comma needs --decimal ,)",
+        ),
+        ("1,200.5", "`1,200.5` is not a finite number (without separators of thousands)"),
+        ("1 200", "`1 200` is not a finite number (without separators of thousands)"),
+    ] {
+        assert_eq!(error(cell), expected);
+    }
+}
+
+#[test]
 fn marks_of_spreadsheets_and_libraries_are_missing_readings_and_failed_ones_are_not() {
     let reading = |cell: &str| read(format!("t_s;u_V;x_mm\n0;0;1\n1;0;{cell}\n"), &Format::default());
     for cell in

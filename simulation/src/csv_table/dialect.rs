@@ -86,6 +86,8 @@ impl FromStr for Decimal {
 /// Reads the numbers of a table. One decimal mark holds for the whole table: `1,234` would else be two different numbers.
 pub(super) struct Numbers {
     accepted: Option<Decimal>,
+    /// True if the mark is a point because commas separate the columns.
+    is_by_separator: bool,
     /// The first mark found, and its line.
     found: Cell<Option<(Decimal, usize)>>,
     /// The columns by index, as long as the mark can separate thousands; `None` once it is a decimal mark.
@@ -107,11 +109,13 @@ impl Numbers {
     /// Where commas separate the columns, a decimal comma has to be asked for.
     pub(super) fn new(dialect: Dialect, separator: Separator) -> Self {
         let point = (separator == Separator::COMMA).then_some(Decimal::Point);
-        Self::of(dialect.decimal.or(point))
+        let is_by_separator = dialect.decimal.is_none() && point.is_some();
+        Self { is_by_separator, ..Self::of(dialect.decimal.or(point)) }
     }
 
     fn of(accepted: Option<Decimal>) -> Self {
-        Self { accepted, found: Cell::default(), columns: RefCell::new(accepted.is_none().then(BTreeMap::new)) }
+        let columns = RefCell::new(accepted.is_none().then(BTreeMap::new));
+        Self { accepted, is_by_separator: false, found: Cell::default(), columns }
     }
 
     /// True for a number with either decimal mark.
@@ -160,14 +164,9 @@ impl Numbers {
         let mut watched = self.columns.borrow_mut();
         let Some(columns) = watched.as_mut() else { return };
         let digits = text.trim_start_matches(['+', '-']);
-        let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
         match Decimal::of(digits).zip(digits.split_once([',', '.'])) {
             Some((mark, (whole, part))) => {
-                let is_thousand = (1..=3).contains(&whole.len())
-                    && !whole.starts_with('0')
-                    && part.len() == 3
-                    && [whole, part].into_iter().all(are_digits);
-                if is_thousand {
+                if is_thousand(whole, part) {
                     let first = &mut columns.entry(column).or_default().first;
                     first.get_or_insert_with(|| (format!("{}: `{text}`", place()), mark));
                 } else {
@@ -180,6 +179,20 @@ impl Numbers {
                 *seen = true;
             }
             None => (),
+        }
+    }
+
+    /// What may be wrong with a cell that is no number, in brackets; empty where nothing is known.
+    pub(super) fn hint(&self, text: &str) -> &'static str {
+        let digits = text.trim_start_matches(['+', '-']);
+        let is_decimal = self.is_by_separator && Self::of(Some(Decimal::Comma)).value(text).is_some();
+        match digits.split_once(',').filter(|_| is_decimal) {
+            Some((whole, part)) if is_thousand(whole, part) => {
+                " (without separators of thousands; a decimal comma needs --decimal ,)"
+            }
+            Some(_) => " (a decimal comma where commas separate the columns needs --decimal ,)",
+            None if has_thousands_separators(text) => " (without separators of thousands)",
+            None => "",
         }
     }
 
@@ -202,8 +215,18 @@ impl Numbers {
     }
 }
 
+/// True for the digits in front of and behind a mark that may separate thousands, as in `1,200`.
+fn is_thousand(whole: &str, part: &str) -> bool {
+    let are_few = (1..=3).contains(&whole.len()) && !whole.starts_with('0') && part.len() == 3;
+    are_few && are_digits(whole) && are_digits(part)
+}
+
+fn are_digits(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
 /// True if a text would be a whole number without points, commas, blanks and apostrophes between its digits.
-pub(super) fn has_thousands_separators(text: &str) -> bool {
+fn has_thousands_separators(text: &str) -> bool {
     const MARKS: [char; 7] = ['.', ',', ' ', '\'', '’', '\u{a0}', '\u{202f}'];
     let digits = text.trim_start_matches(['+', '-']);
     digits.starts_with(|letter: char| letter.is_ascii_digit())
