@@ -373,7 +373,7 @@ impl Row<'_> {
     pub fn number_or_dash(&self, column: usize, most: f64) -> Result<Option<f64>> {
         match self.text(column) {
             "-" => Ok(None),
-            "" => Err(self.is_not(column, "a finite number; expected `-` for a missing reading")),
+            "" => Err(self.is_not(column, "a finite number, or `-` for a missing reading")),
             _ => self.number_within(column, most).map(Some),
         }
     }
@@ -389,8 +389,12 @@ impl Row<'_> {
     /// The error for a cell that is not `what`.
     pub fn is_not(&self, column: usize, what: &str) -> anyhow::Error {
         let (text, place) = (self.text(column), self.place(column));
+        let expected = what.split_once("; expected").map_or(what, |(expected, _)| expected);
+        if text.is_empty() {
+            return BadInput(format!("{place}: no value; expected {expected}")).into();
+        }
         if unclosed(text) {
-            return BadInput(format!("{place}: {UNCLOSED}; expected {what}")).into();
+            return BadInput(format!("{place}: {UNCLOSED}; expected {expected}")).into();
         }
         BadInput(format!("{place}: `{}` is not {what}{}", excerpt(text), self.numbers.hint(text))).into()
     }

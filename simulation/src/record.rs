@@ -228,7 +228,7 @@ mod tests {
             ("time_s,voltage_v,stiffness\n0,1,1e300\n", "line 2, column stiffness: `1e300`"),
             (
                 "time_s,voltage_v,stiffness\n0,1,\n1,2,3\n",
-                "line 2, column stiffness: `` is not a finite number; expected `-` for a missing reading",
+                "line 2, column stiffness: no value; expected a finite number, or `-` for a missing reading",
             ),
             ("time_s,voltage_v\n1e300,1\n0,1\n", "line 3, column time_s: 0 follows 1e300; expected increasing times"),
             (&format!("time_s,voltage_v\n0,{}\n1,2\n", "7".repeat(400)), &format!("`{}...` is", "7".repeat(40))),

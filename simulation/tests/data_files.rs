@@ -263,7 +263,8 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
         (format!("{head}0;1;1 234\n"), &any, "`1 234` is not a finite number (without separators of thousands)"),
         (format!("{head}0;1;inf\n"), &any, "line 2, column x_mm: `inf` is not a finite number"),
         (format!("{head}0;NaN;1\n"), &any, "line 2, column u_kV: `NaN` is not a finite number"),
-        (format!("{head};1;1\n"), &any, "line 2, column t_ms: `` is not a finite number"),
+        (format!("{head};1;1\n"), &any, "line 2, column t_ms: no value; expected a finite number"),
+        (format!("{head}0;;1\n"), &any, "line 2, column u_kV: no value; expected a finite number"),
         (format!("{head}0;1001;1\n"), &any, "line 2, column u_kV: `1001` is not a number from -1000 to 1000"),
         (format!("{head}0;1;1e16\n"), &any, "line 2, column x_mm: `1e16` is not a number from -1e15 to 1e15"),
         (
@@ -459,7 +460,9 @@ fn rows_of_separators_are_blank_lines() {
     let text = "t_s;u_V;x_mm\n0;0;1\n;;\n1;0;2\n;;\n;;\n";
     let rows = read(text, &Format::default()).unwrap().record.rows;
     assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [2, 4]);
-    assert!(read("t_s;u_V;x_mm\n0;0;1\n;;5\n", &Format::default()).unwrap_err().contains("line 3, column t_s: ``"));
+    assert!(
+        read("t_s;u_V;x_mm\n0;0;1\n;;5\n", &Format::default()).unwrap_err().contains("line 3, column t_s: no value")
+    );
 }
 
 #[test]

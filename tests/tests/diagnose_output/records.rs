@@ -40,7 +40,7 @@ fn an_invalid_file_is_rejected_with_line_and_column() {
         ("text", edited("\n1,0,0\n", "\n1,0,high\n"), "line 4, column stiffness: `high` is not a finite number"),
         ("nan", edited("\n1,0,0\n", "\n1,NaN,0\n"), "line 4, column voltage_v: `NaN` is not a finite number"),
         ("infinite", edited("\n1,0,0\n", "\n1,0,-inf\n"), "line 4, column stiffness: `-inf` is not a finite number"),
-        ("hole", edited("\n1,0,0\n", "\n1,,0\n"), "line 4, column voltage_v: `` is not a finite number"),
+        ("hole", edited("\n1,0,0\n", "\n1,,0\n"), "line 4, column voltage_v: no value; expected a finite number"),
         ("short", edited("\n1,0,0\n", "\n1,0\n"), "line 4: 2 field(s); expected 3"),
         ("voltage", edited("voltage_v", "volts"), "line 1: no column `voltage_v`"),
         ("reading", edited("stiffness", "strain"), "no column `stiffness`"),
