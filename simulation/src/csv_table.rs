@@ -17,7 +17,7 @@ use csv::StringRecord;
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, number};
 use dialect::{Dialect, Numbers, Separator};
-use header::are_names;
+use header::{are_names, is_left_out};
 use stream::{Stream, unwrapped};
 use text::Source;
 
@@ -159,6 +159,11 @@ impl<'a> Table<'a> {
         self.header.get(index).unwrap_or_default()
     }
 
+    /// True for a column of comments, which rows may lack.
+    pub(crate) fn has_comments(&self, index: usize) -> bool {
+        index + 1 == self.header.len() && is_left_out(self.column(index))
+    }
+
     /// Index of a column, `None` if the table does not have it. Without a column of exactly this name, the only one that has
     /// it apart from case, blanks and quotes.
     pub fn find(&self, column: &str) -> Option<usize> {
@@ -211,7 +216,8 @@ impl<'a> Table<'a> {
     /// Reads the next row; `None` after the last.
     ///
     /// # Errors
-    /// [`BadInput`] with the line of a row that has not as many fields as the header; empty ones at its end do not count.
+    /// [`BadInput`] with the line of a row that has not as many fields as the header; empty ones at its end do not count, nor does a
+    /// comment that is not there.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>> {
         if !std::mem::take(&mut self.is_returned) && !self.advance()? {
             return Ok(None);
@@ -237,6 +243,9 @@ impl<'a> Table<'a> {
             if self.separator == Separator::BLANKS || self.record.len() > expected {
                 let is_trailing = self.record.iter().skip(expected).all(str::is_empty);
                 keep_columns(&mut self.record, self.separator, |index| index < expected || !is_trailing);
+            }
+            if self.record.len() + 1 == expected && self.has_comments(expected - 1) {
+                self.record.push_field("");
             }
             let found = self.record.len();
             if found == expected {

@@ -456,6 +456,33 @@ fn marks_of_spreadsheets_and_libraries_are_missing_readings_and_failed_ones_are_
 }
 
 #[test]
+fn rows_may_lack_the_comment_with_which_labview_ends_its_header() {
+    let header = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\n\
+                  Multi_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\nDate\t2026/01/31\nTime\t10:00:00.5\n\
+                  ***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t2\t2\t\nDate\t2026/01/31\t2026/01/31\t\n\
+                  X_Dimension\tTime\tTime\t\nX0\t0.0\t0.0\t\nDelta_X\t0.1\t0.1\t\n***End_of_Header***\t\t\t\n";
+    let names = ["X_Value:s", "Voltage", "Force:N"].map(|name| Some(name.to_owned()));
+    let [time, voltage, reading] = names;
+    let asked = Format { columns: ColumnNames { time, voltage, reading, stiffness: None }, ..Format::default() };
+    for rows in ["0.0\t0\t1.5\n0.1\t36\t\n", "0.0\t0\t1.5\tbegun by hand\n0.1\t36\t\t\n"] {
+        let text = format!("{header}X_Value\tVoltage\tForce\tComment\n{rows}");
+        let read = read(text, &asked).unwrap_or_else(|error| panic!("{rows}: {error}"));
+        let rows: Vec<_> =
+            read.record.rows.iter().map(|row| (row.line, row.time_s, row.voltage_v, row.measured)).collect();
+        assert_eq!(rows, [(21, 0.0, 0.0, Some(1.5)), (22, 0.1, 36.0, None)]);
+        assert_eq!(read.remarks[0], "r.csv: 19 line(s) above the header in line 20, skipped");
+    }
+    let text = format!("{header}X_Value\tVoltage\tForce\tComment\n0.0\t0\t1.5\n0.1\t36\t1.5\n");
+    let error = read(text, &Format::default()).unwrap_err();
+    assert!(
+        error.contains("--time one of X_Value, Force --voltage Voltage --reading one of X_Value, Force, found"),
+        "{error}"
+    );
+    let short = read("t_s;u_V;x_mm;Comment\n0;0;1\n1;0\n", &Format::default()).unwrap_err();
+    assert_eq!(short, "r.csv, line 3: 2 field(s); expected 4 as in the header");
+}
+
+#[test]
 fn rows_of_separators_are_blank_lines() {
     let text = "t_s;u_V;x_mm\n0;0;1\n;;\n1;0;2\n;;\n;;\n";
     let rows = read(text, &Format::default()).unwrap().record.rows;

@@ -1,5 +1,7 @@
 //! Which line of a text is the header of its table: instruments write titles above it, and units below.
 
+use std::ops::RangeInclusive;
+
 use super::dialect::{Numbers, Separator, is_blank};
 use crate::units::{are_labels, is_unit};
 
@@ -26,7 +28,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
     });
     let lines: Vec<(usize, &str)> = starts.filter(|(_, line)| has_content(line)).collect();
     let mut found: Vec<Candidate> = Vec::new();
-    // Number of columns of the last header, as long as its rows go on.
+    // Numbers of columns of the last header's rows, as long as its rows go on.
     let mut table = None;
     for index in 0..lines.len().min(most) {
         let below = || lines[index + 1..].iter().map(|(_, line)| *line);
@@ -34,7 +36,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
         // A row of numbers can look like names to another separator: `high<tab>0,5<tab>0,7` to the comma.
         table = table.filter(|(columns, separator)| {
             let cells = Cells::of(line, *separator);
-            cells.are_row(*columns) || cells.are_units_of(*columns) || cells.have_labels()
+            cells.are_row(columns) || cells.are_units_of(columns) || cells.have_labels()
         });
         if table.is_some() {
             continue;
@@ -51,7 +53,7 @@ pub(super) fn candidates(text: &str, known: Option<Separator>, most: usize) -> V
             found.push(Candidate { start, separator });
         }
         found.push(Candidate { start, separator });
-        table = Some((header.used, separator));
+        table = Some((header.columns(), separator));
     }
     found
 }
@@ -75,6 +77,11 @@ pub(super) fn are_names(line: &str, separator: Separator, columns: usize) -> boo
     Cells::of(line, separator).are_names(columns)
 }
 
+/// True for the name of a last column that rows may lack: LabVIEW ends a header with it, and rows with their last number.
+pub(super) fn is_left_out(name: &str) -> bool {
+    name.eq_ignore_ascii_case("comment")
+}
+
 /// False for a comment, and for a line of nothing but blanks and separators.
 fn has_content(line: &str) -> bool {
     !line.starts_with('#') && !is_blank(line)
@@ -91,12 +98,12 @@ fn separators(known: Option<Separator>, line: &str) -> impl Iterator<Item = Sepa
 /// True for a line of names above as many columns of numbers.
 fn is_header<'t>(line: &str, below: impl Iterator<Item = &'t str>, separator: Separator) -> bool {
     let header = Cells::of(line, separator);
-    let columns = header.used;
+    let columns = header.columns();
     let mut below = below.peekable();
     below.next_if(|line| Cells::of(line, separator).have_labels());
-    below.next_if(|line| Cells::of(line, separator).are_units_of(columns));
+    below.next_if(|line| Cells::of(line, separator).are_units_of(&columns));
     let mut rows = below.take(CHECKED_ROWS).map(|row| Cells::of(row, separator)).peekable();
-    header.are_names(columns) && rows.peek().is_some() && rows.all(|row| row.are_row(columns))
+    header.are_names(header.used) && rows.peek().is_some() && rows.all(|row| row.are_row(&columns))
 }
 
 /// A line, split at a separator.
@@ -120,13 +127,19 @@ impl<'t> Cells<'t> {
         Self { cells, used }
     }
 
+    /// Numbers of columns of the rows below these names.
+    fn columns(&self) -> RangeInclusive<usize> {
+        let may_lack_one = self.cells[..self.used].last().is_some_and(|name| is_left_out(name));
+        self.used - usize::from(may_lack_one)..=self.used
+    }
+
     /// True if these can be the cells of a number of columns; the last ones may be empty.
-    fn fit(&self, columns: usize) -> bool {
-        (self.used..=self.cells.len()).contains(&columns)
+    fn fit(&self, columns: &RangeInclusive<usize>) -> bool {
+        self.used <= *columns.end() && self.cells.len() >= *columns.start()
     }
 
     /// True for a row of numbers of a table with a number of columns.
-    fn are_row(&self, columns: usize) -> bool {
+    fn are_row(&self, columns: &RangeInclusive<usize>) -> bool {
         self.fit(columns) && self.have_numbers()
     }
 
@@ -140,7 +153,7 @@ impl<'t> Cells<'t> {
         self.used == columns && (1..columns).all(is_new) && !self.have_numbers() && !self.are_units()
     }
 
-    fn are_units_of(&self, columns: usize) -> bool {
+    fn are_units_of(&self, columns: &RangeInclusive<usize>) -> bool {
         self.fit(columns) && self.are_units()
     }
 

@@ -174,8 +174,10 @@ impl ColumnNames {
                 spec
             }
         };
-        let mut free: Vec<usize> =
-            (0..table.columns().count()).filter(|index| !taken(*index)).take(MOST_COLUMNS).collect();
+        let mut free: Vec<usize> = (0..table.columns().count())
+            .filter(|index| !taken(*index) && !table.has_comments(*index))
+            .take(MOST_COLUMNS)
+            .collect();
         let has_columns = !free.is_empty();
         let missing = [Role::Voltage, Role::Reading].iter().filter(|role| found[**role as usize].is_none()).count();
         let options = Role::ALL.map(|role| {
