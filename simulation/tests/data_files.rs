@@ -336,6 +336,37 @@ fn every_damage_is_named_with_line_column_and_what_was_expected() {
             "line 2, column time: `01/31/2026 10:00` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, 31",
         ),
         (
+            "time,u_V,x_mm\n10:00:00,1,2\n,1,2\n".into(),
+            &any,
+            "line 3, column time: no value; expected a time of day, as in the first row",
+        ),
+        (
+            "time,u_V,x_mm\n10:00,1,2\n10:01,1,2\n".into(),
+            &any,
+            "line 2, column time: `10:00` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, \
+             31.01.2026 23:59:58.5, 23:59:58.5, 59:58.5",
+        ),
+        (
+            "time,u_V,x_mm\n59:59.5,1,2\n1:00:00.5,1,2\n".into(),
+            &any,
+            "line 3, column time: `1:00:00.5` is not a time in minutes and seconds, as in the first row; expected another such",
+        ),
+        (
+            "time,u_V,x_mm\n10:01.5,1,2\n10:00.5,1,2\n".into(),
+            &any,
+            "line 3, column time: 10:00.5 follows a later or equal time; expected increasing times",
+        ),
+        (
+            "time,u_V,x_mm\n60:01.5,1,2\n10:00.5,1,2\n".into(),
+            &any,
+            "line 3, column time: 10:00.5 follows a later or equal time; expected increasing times",
+        ),
+        (
+            "time [min],u_V,x_mm\n10:01.5,1,2\n".into(),
+            &any,
+            "line 2, column time [min]: `10:01.5` is a time stamp, not a number in min; expected a number",
+        ),
+        (
             "time,u_V,x_mm\n10:00:00,1,2\n2026-01-31T10:00:01,1,2\n".into(),
             &any,
             "line 3, column time: `2026-01-31T10:00:01` is not a time of day, as in the first row; expected another such",
@@ -636,6 +667,10 @@ fn time_stamps_and_times_since_1970_are_counted_from_the_first_row() {
     assert_eq!(times(over_two_midnights), (expected, "s".to_owned(), from_first.clone()));
     let elapsed = "Time;u_V;x_mm\n0:00:00;0;1\n15:00:00;0;1\n31:00:00,25;0;1\n";
     assert_eq!(times(elapsed), (vec![0.0, 54000.0, 111_600.25], "s".to_owned(), from_first.clone()));
+    let over_an_hour = "Time (mm:ss.s);u_V;x_mm\n59:59,5;0;1\n00:01,0;0;1\n30:00,0;0;1\n59:59,0;0;1\n0:00,5;0;1\n";
+    assert_eq!(times(over_an_hour), (vec![0.0, 1.5, 1800.5, 3599.5, 3601.0], "s".to_owned(), from_first.clone()));
+    let minutes = "Date;Time;u_V;x_mm\n2026-01-31;00:00.0;0;1\n2026-02-01;59:59.5;0;1\n2026-02-01;100:00.25;0;1\n";
+    assert_eq!(times(minutes), (vec![0.0, 3599.5, 6000.25], "s".to_owned(), from_first.clone()));
     // The days are in a column of dates, of which one stays the same.
     let dates = |first: &str, second: &str, third: &str| {
         format!(

@@ -253,7 +253,11 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
             && !unit.trim().is_empty()
             && !base.trim().is_empty()
         {
-            return (base.trim_end_matches([' ', '_']), Some(usual(unit.trim()).unwrap_or(unit.trim().to_owned())));
+            let base = base.trim_end_matches([' ', '_']);
+            if is_clock_form(unit.trim()) {
+                return (base, None);
+            }
+            return (base, Some(usual(unit.trim()).unwrap_or(unit.trim().to_owned())));
         }
     }
     if let Some(split) = split_quotient(name) {
@@ -272,6 +276,11 @@ fn split_unit(name: &str) -> (&str, Option<String>) {
         }
     }
     (name, None)
+}
+
+/// True for the form of a time stamp, such as `hh:mm:ss.s`, which is no unit.
+fn is_clock_form(text: &str) -> bool {
+    text.contains(':') && text.chars().all(|letter| "HMShms:.,f0".contains(letter))
 }
 
 /// Splits a name that ends in a quotient of units, `v_m_per_s`, `flow l per min`, `omega_rad/s`, whose last word alone is not its
@@ -357,6 +366,8 @@ mod tests {
             ("clicks_per_s", "clicks_per_s", None),
             ("m_per_s", "m_per_s", None),
             ("mm/s", "mm/s", None),
+            ("Time (mm:ss.s)", "Time", None),
+            ("t [HH:MM:SS]", "t", None),
         ] {
             assert_eq!(split_unit(name), (base, unit.map(str::to_owned)), "{name}");
         }

@@ -8,11 +8,12 @@ use crate::bad_input;
 use crate::bad_input::excerpt;
 use crate::csv_table::Row;
 
-/// Nanoseconds in a day.
-const DAY_NS: i128 = 86_400_000_000_000;
-
-/// A time below this, in ns, may be the first one of a stopwatch.
+/// Nanoseconds in a minute; a time below may be the first one of a stopwatch.
 const MINUTE_NS: i128 = 60_000_000_000;
+/// Nanoseconds in an hour.
+const HOUR_NS: i128 = 60 * MINUTE_NS;
+/// Nanoseconds in a day.
+const DAY_NS: i128 = 24 * HOUR_NS;
 
 /// A time as read from a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,11 +36,11 @@ impl Time {
 #[derive(Debug, Default)]
 pub(super) struct Clock {
     first: Option<First>,
-    /// The last time of day, in ns since the first midnight.
+    /// The last time of day or of the hour, in ns since the first midnight or the first full hour.
     last: i128,
     /// Time from the row before the last one to the last one, in ns.
     last_step: i128,
-    /// True once a time has 24 h or more: those of a stopwatch, which do not begin again after midnight.
+    /// True once a time has 24 h, or 60 min, or more: those of a stopwatch, which do not begin again.
     is_stopwatch: bool,
     dates: Dates,
 }
@@ -80,31 +81,35 @@ impl Clock {
         let text = row.text(column);
         let stamp = Stamp::parse(text);
         if self.first.is_none()
-            && let Some(stamp) = stamp.filter(|stamp| stamp.form == Form::TimeOfDay)
+            && let Some(stamp) = stamp
         {
-            self.dates = Dates::of(row, column);
+            if stamp.form == Form::TimeOfDay {
+                self.dates = Dates::of(row, column);
+            }
             self.last = stamp.nanoseconds;
         }
-        let first = *self.first.get_or_insert(match stamp {
-            Some(stamp) => First::Stamp(stamp),
-            None if is_date(text) => bad_input!(
+        let first = match (self.first, stamp) {
+            (Some(first), _) => first,
+            (None, Some(stamp)) => First::Stamp(stamp),
+            _ if is_date(text) => bad_input!(
                 "{}: `{text}` is a date without time; expected a number or a time stamp such as 2026-01-31T23:59:58.5",
                 row.place(column)
             ),
-            // `31/01/2026` or `01/31/2026`, `59:58.5`: which number is the day, the hour?
-            None if text.contains([':', '/']) => bad_input!(
-                "{}: `{}` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, 31.01.2026 23:59:58.5, 23:59:58.5",
+            // `31/01/2026` or `01/31/2026`, `59:58`: which number is the day, the hour?
+            _ if text.contains([':', '/']) => bad_input!(
+                "{}: `{}` is not a time stamp; expected a number, or one such as 2026-01-31T23:59:58.5, 31.01.2026 23:59:58.5, 23:59:58.5, 59:58.5",
                 row.place(column),
                 excerpt(text)
             ),
-            None => First::Number(row.number(column)?, Exact::parse(text)),
-        });
+            _ => First::Number(row.number(column)?, Exact::parse(text)),
+        };
+        self.first = Some(first);
         match (first, stamp) {
             (First::Stamp(first), Some(mut stamp)) if first.form == stamp.form => {
-                if stamp.form == Form::TimeOfDay {
-                    self.is_stopwatch |= stamp.nanoseconds >= DAY_NS;
+                if let Some(period) = stamp.form.period_ns() {
+                    self.is_stopwatch |= stamp.nanoseconds >= period;
                     let had_changed = self.dates.changed.is_some();
-                    let wraps = self.last - stamp.nanoseconds >= DAY_NS / 2;
+                    let wraps = self.last - stamp.nanoseconds >= period / 2;
                     let days = if self.is_stopwatch { None } else { self.dates.days(row, wraps)? };
                     if let Some(days) = days {
                         let step = stamp.nanoseconds - self.last;
@@ -119,8 +124,9 @@ impl Clock {
                         }
                         stamp.nanoseconds += days * DAY_NS;
                     } else if !self.is_stopwatch {
-                        // After midnight a clock begins again: a time that is earlier by 12 h or more is one of the next day.
-                        stamp.nanoseconds += DAY_NS * ((self.last - stamp.nanoseconds + DAY_NS / 2) / DAY_NS).max(0);
+                        // A clock begins again at midnight, one without hours at the full hour: a time that is earlier by half a
+                        // period or more is one of the next.
+                        stamp.nanoseconds += period * ((self.last - stamp.nanoseconds + period / 2) / period).max(0);
                     }
                     self.last_step = stamp.nanoseconds - self.last;
                     self.last = stamp.nanoseconds;
@@ -204,13 +210,21 @@ impl Exact {
 enum Form {
     /// Midnight, or the start of a measurement: `23:59:58.5`, hours may exceed a day.
     TimeOfDay,
+    /// A full hour, or the start of a measurement: `59:58.5`, minutes may exceed an hour. Spreadsheets write such times without hours.
+    TimeOfHour,
     WithoutZone,
     WithZone,
 }
 
 impl Form {
     fn name(self) -> &'static str {
-        ["a time of day", "a time stamp without a zone", "a time stamp with a zone"][self as usize]
+        ["a time of day", "a time in minutes and seconds", "a time stamp without a zone", "a time stamp with a zone"]
+            [self as usize]
+    }
+
+    /// The time after which a clock of this form begins again, in ns; `None` for one with dates.
+    fn period_ns(self) -> Option<i128> {
+        [Some(DAY_NS), Some(HOUR_NS), None, None][self as usize]
     }
 }
 
@@ -228,10 +242,15 @@ impl Stamp {
             nanoseconds: i128::from(seconds) * 1_000_000_000 + i128::from(below),
             form,
         };
-        if let Some((hours, rest)) = text.split_once(':').filter(|(hours, _)| is_digits(hours, 1, 4)) {
-            let time = NaiveTime::parse_from_str(&format!("0:{rest}"), "%H:%M:%S%.f").ok()?;
-            let seconds = 3600 * hours.parse::<i64>().ok()? + i64::from(time.num_seconds_from_midnight());
-            return Some(stamp(seconds, time.nanosecond(), Form::TimeOfDay));
+        if let Some((first, rest)) = text.split_once(':').filter(|(first, _)| is_digits(first, 1, 4)) {
+            // `59:58` may be a time of day without seconds; those of `59:58.5` have a fraction.
+            let (form, unit_s, rest) = match rest.contains(':') || !rest.contains('.') {
+                true => (Form::TimeOfDay, 3600, format!("0:{rest}")),
+                false => (Form::TimeOfHour, 60, format!("0:0:{rest}")),
+            };
+            let time = NaiveTime::parse_from_str(&rest, "%H:%M:%S%.f").ok()?;
+            let seconds = unit_s * first.parse::<i64>().ok()? + i64::from(time.num_seconds_from_midnight());
+            return Some(stamp(seconds, time.nanosecond(), form));
         }
         if !is_dated(&text) {
             return None;
@@ -252,7 +271,7 @@ impl Stamp {
     }
 }
 
-/// True for a text that is a time of day, or starts with a date.
+/// True for a text that is a time of day or of the hour, or starts with a date.
 pub(super) fn is_stamp(text: &str) -> bool {
     is_dated(text) || Stamp::parse(text).is_some()
 }
@@ -309,7 +328,9 @@ mod tests {
             ("9:59:58.5", "10:00:00", Some(1.5)),
             ("0:00:00,000", "100:00:00,001", Some(360_000.001)),
             ("0:00:00", "0:60:00", None),
-            ("0:00:00", "59:58.5", None),
+            ("59:58.5", "60:00,0", Some(1.5)),
+            ("00:00.0", "59:58", None),
+            ("00:00.0", "12345:00.0", None),
             ("0:00:00", "12:00", None),
             ("31.01.2026 12:00", "01/31/2026 12:00", None),
             ("2026-01-31T12:00:00", "2026-02-30T12:00:00", None),
