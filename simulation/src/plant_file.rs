@@ -403,6 +403,17 @@ impl PlantFile {
         delay.into_iter().chain(even).chain(modes).chain(unmodelled).collect()
     }
 
+    /// The spring of a file called `name` in messages, if it is the plain one.
+    ///
+    /// # Errors
+    /// [`crate::bad_input::BadInput`] for an extended spring.
+    pub fn plain(&self, name: &str) -> Result<Plant> {
+        match self.extended().plain() {
+            Some(plain) => Ok(plain),
+            None => bad_input!("{name}: an extended spring; expected [relaxation] with one share and tau_s only"),
+        }
+    }
+
     /// Formats the file as TOML.
     ///
     /// # Errors
@@ -463,10 +474,7 @@ pub fn load_with_text(plant: &str) -> Result<(PlantFile, String)> {
 /// # Errors
 /// The errors of [`load`], and [`crate::bad_input::BadInput`] for an extended spring.
 pub fn load_plain(plant: &str) -> Result<Plant> {
-    match load(plant)?.extended().plain() {
-        Some(plain) => Ok(plain),
-        None => bad_input!("{plant}: an extended spring; expected [relaxation] with one share and tau_s only"),
-    }
+    load(plant)?.plain(plant)
 }
 
 /// Parses the plant file `text`, called `name` in messages.

@@ -46,6 +46,47 @@ fn a_gain_that_changes_is_named_with_size_and_beginning_and_nothing_is_not() {
     assert_eq!(sound["last"]["verdict"], "quiet");
 }
 
+/// The same record with another header and other units, read by the options of the other commands, gives the same answer.
+#[test]
+fn a_record_in_any_columns_and_units_gives_the_same_answer() {
+    let folder = tempdir().unwrap();
+    let plain = record(1.04);
+    fs::write(folder.path().join("plain.csv"), &plain).unwrap();
+    let mut foreign = "t_ms;set_mm;u_kV;y_mm\n".to_owned();
+    for row in plain.lines().skip(1) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let (ms, kv, mm) = (1e3 * cells[0] + 1.7e12, cells[1] / 1e3, 0.5 + 0.02 * cells[2]);
+        writeln!(foreign, "{ms:.0};0;{kv:.6};{mm:.6}").unwrap();
+    }
+    fs::write(folder.path().join("foreign.csv"), foreign).unwrap();
+    let spring = "schema = 1\n[units]\nreading = \"mm\"\n[reading]\ngain = 0.02\nzero = 0.5\n[relaxation]\nshare = 0.09090909090909091\ntau_s = 5.5\n";
+    fs::write(folder.path().join("spring.toml"), spring).unwrap();
+    fs::write(folder.path().join("columns.toml"), "[columns]\nreading = \"y_mm\"\ninput = \"linear\"\n").unwrap();
+    let named = |arguments: &[&str]| {
+        let report = json(folder.path(), &[&["isolate"], arguments, &["--json"]].concat());
+        let last = &report["last"];
+        let size = last["size"]["value"].as_f64().unwrap();
+        (last["cause"].to_string(), (1e3 * size).round(), report["rows"].as_u64().unwrap())
+    };
+    let expected = ("\"gain-error\"".to_owned(), 40.0, 14_000);
+    assert_eq!(named(&["plain.csv", "--column", "stiffness"]), expected);
+    assert_eq!(named(&["foreign.csv", "--reading", "y_mm", "--plant", "spring.toml"]), expected);
+    let asked = ["foreign.csv", "--time", "t_ms:ms", "--voltage", "u_kV:kV", "--reading", "y_mm:mm"];
+    assert_eq!(named(&[&asked[..], &["--plant", "spring.toml"]].concat()), expected);
+    for (arguments, expected) in [
+        (&asked[..], "foreign.csv: readings in mm; expected V, as the nominal spring's, or --column for a stiffness"),
+        (&["foreign.csv", "--columns", "columns.toml"], "columns.toml, [columns]: input: expected hold"),
+        (
+            &["plain.csv", "--column", "voltage_v"],
+            "column `voltage_v` is the voltage; expected another one for --column",
+        ),
+    ] {
+        let output = run(folder.path(), &[&["isolate"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&output.stderr).contains(expected), "{}", text(&output.stderr));
+    }
+}
+
 #[test]
 fn what_cannot_be_run_is_one_line_and_exit_code_2() {
     let folder = tempdir().unwrap();
@@ -54,7 +95,7 @@ fn what_cannot_be_run_is_one_line_and_exit_code_2() {
     fs::write(folder.path().join("slow.csv"), "time_s,voltage_v,stiffness\n0,1,1\n1,2,1\n2,3,1\n").unwrap();
     for (arguments, expected) in [
         (&["isolate", "no.csv"][..], "no.csv"),
-        (&["isolate", "bare.csv"], "bare.csv: no column `stiffness`; expected readings"),
+        (&["isolate", "bare.csv"], "bare.csv, line 1: no column `stiffness`; expected a header"),
         (&["isolate", "slow.csv"], "slow.csv: fewer than 10 readings; expected more, or --noise-v"),
         (&["isolate", "slow.csv", "--noise-v", "1"], "slow.csv: rows 1.000 s apart; expected at most 0.6 s"),
         (&["isolate", "sound.csv", "--noise-v", "0"], "--noise-v: noise_v = 0 is not allowed: expected 0.05 to 100 V"),

@@ -8,13 +8,14 @@ use host_sim::output::isolate::text;
 use host_sim::output::terminal::{json, print};
 use model::isolation::{Settings, Tolerance};
 use simulation::bad_input;
+use simulation::isolation::readings::equivalent;
 use simulation::isolation::trace::{self, noise_v};
 use simulation::option_names::{SETTINGS, named};
-use simulation::plant_file::load_plain;
-use simulation::record::Record;
+use simulation::plant_file;
 use simulation::spring_error::SpringError;
 
 use super::identified::errors;
+use super::record_arguments::FormatArguments;
 use super::spring_error::ErrorOf;
 
 /// Run the MCU's fault isolation over a record and print what it says, and when
@@ -29,15 +30,17 @@ Examples:
   vsj isolate record.csv --plant out/nominal/plant.toml --limit-v 1000
   vsj isolate record.csv --known tau=2 --known gain=1  known within 2 and 1 %
   vsj isolate record.csv --plant plant.toml --identified identified.json
+  vsj isolate hv.csv --reading x_mm:mm --plant out/nominal/plant.toml
   vsj isolate record.csv --noise-v 0.5 --json | jq .last")]
 pub(crate) struct Arguments {
-    /// The record: time_s, voltage_v (held between the rows) and the readings, rows at most 0.6 s apart
+    /// The record: a table with a header, or an MCAP or Parquet file; the voltage is held between the rows, which are at most 0.6 s
+    /// apart
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
-    /// Column of the readings, in V of equivalent static voltage
-    #[arg(long, default_value = "stiffness", value_name = "NAME")]
-    column: String,
-    /// The nominal spring: `paper`, or a plant file with a share and one time constant only
+    #[command(flatten)]
+    format: FormatArguments,
+    /// The nominal spring: `paper`, or a plant file with a share and one time constant only, whose [reading] converts the readings
+    /// to V of equivalent static voltage, but for --column
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `tau`, `gain` or `share` of the nominal spring is known to within this, both ways, 0 to 25 %: errors within it raise no alarm;
@@ -66,9 +69,11 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<()> {
-    let record = Record::open(&arguments.data, &arguments.column)?;
+    let measured = arguments.format.open_held(&arguments.data)?;
+    let plant = plant_file::load(&arguments.plant)?;
+    let record = if arguments.format.names_stiffness() { measured.record } else { equivalent(measured, &plant)? };
     if record.rows.iter().all(|row| row.measured.is_none()) {
-        bad_input!("{}: no column `{}`; expected readings", record.name, arguments.column);
+        bad_input!("{}: no reading; expected some", record.name);
     }
     if arguments.noise_correlation_s > 0.0 && arguments.noise_v.is_none() {
         bad_input!("--noise-correlation-s: expected --noise-v as well; only white noise is found from the readings");
@@ -84,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let SpringError { time_constant, share, gain } =
         errors("--known", &arguments.known, arguments.identified.as_deref())?;
     let settings = Settings {
-        plant: load_plain(&arguments.plant)?,
+        plant: plant.plain(&arguments.plant)?,
         noise_v,
         noise_correlation_s: arguments.noise_correlation_s,
         range_v: arguments.limit_v,

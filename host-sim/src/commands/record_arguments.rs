@@ -1,12 +1,13 @@
 //! Options of the commands that read measured records: files, columns, units.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::terminal::remark;
 use identify::Input;
 use record_files::open;
+use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::csv_table::dialect::{Decimal, Dialect, Separator};
 use simulation::record::{ColumnNames, Format, MeasuredRecord, columns_file, remarks_on};
@@ -20,7 +21,18 @@ pub(crate) struct RecordArguments {
     /// most 1 000 000 rows and 512 MiB
     #[arg(value_name = "DATA.csv", required = true)]
     data: Vec<PathBuf>,
-    /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of time stamps or times of day; default: time_s
+    #[command(flatten)]
+    format: FormatArguments,
+    /// Interpolation of the voltage between the rows; default: hold
+    #[arg(long, value_parser = one_of(INPUT))]
+    input: Option<Input>,
+}
+
+/// How the files of records are written.
+#[derive(Args, Debug)]
+pub(crate) struct FormatArguments {
+    /// Column of the time and its unit: ns, us, ms, s, min, h or d; or a column of time stamps, times of day or
+    /// minutes and seconds (59:58.5); default: time_s
     #[arg(long, value_name = "NAME[:UNIT]")]
     time: Option<String>,
     /// Column of the commanded voltage and its unit: nV to MV, or any other unit of a command; default: voltage_v, else
@@ -48,9 +60,6 @@ pub(crate) struct RecordArguments {
     /// Order the rows by time; rows at the same time become one, with the mean of their readings
     #[arg(long)]
     sort: bool,
-    /// Interpolation of the voltage between the rows; default: hold
-    #[arg(long, value_parser = one_of(INPUT))]
-    input: Option<Input>,
 }
 
 impl RecordArguments {
@@ -60,17 +69,42 @@ impl RecordArguments {
     /// # Errors
     /// [`simulation::bad_input::BadInput`] with file, line, column and what was expected.
     pub(crate) fn open(&self) -> Result<(Vec<MeasuredRecord>, Input)> {
-        let (format, input) = self.format()?;
-        let read = |path: &PathBuf| open(path, &format, self.topic.as_deref());
-        let records: Vec<MeasuredRecord> = self.data.iter().map(read).collect::<Result<_>>()?;
+        let (format, input) = self.format.read()?;
+        let records = self.format.open(&self.data, &format)?;
+        Ok((records, self.input.or(input).unwrap_or_default()))
+    }
+}
+
+impl FormatArguments {
+    /// True if the reading is the stiffness as the equivalent static voltage, in V, whatever its column is called.
+    pub(crate) fn names_stiffness(&self) -> bool {
+        self.column.is_some()
+    }
+
+    /// Opens a record whose voltage is held between its rows, and prints remarks about it to stderr.
+    ///
+    /// # Errors
+    /// [`simulation::bad_input::BadInput`] with file, line, column and what was expected.
+    pub(crate) fn open_held(&self, path: &Path) -> Result<MeasuredRecord> {
+        let (format, input) = self.read()?;
+        if let (Some(path), Some(Input::Linear | Input::Stair)) = (&self.columns, input) {
+            bad_input!("{}, [columns]: input: expected hold, the voltage between the rows here", path.display());
+        }
+        let mut records = self.open(&[path.to_owned()], &format)?;
+        Ok(records.remove(0))
+    }
+
+    fn open(&self, paths: &[PathBuf], format: &Format) -> Result<Vec<MeasuredRecord>> {
+        let read = |path: &PathBuf| open(path, format, self.topic.as_deref());
+        let records: Vec<MeasuredRecord> = paths.iter().map(read).collect::<Result<_>>()?;
         for text in remarks_on(&records)? {
             remark(&text);
         }
-        Ok((records, input))
+        Ok(records)
     }
 
-    /// The options together with those of the file `--columns`.
-    fn format(&self) -> Result<(Format, Input)> {
+    /// The options together with those of the file `--columns`, which may also name the interpolation of the voltage.
+    fn read(&self) -> Result<(Format, Option<Input>)> {
         let columns = ColumnNames {
             time: self.time.clone(),
             voltage: self.voltage.clone(),
@@ -79,10 +113,10 @@ impl RecordArguments {
         };
         let dialect = Dialect { separator: self.separator, decimal: self.decimal };
         let given = Format { columns, dialect, sort: self.sort };
-        let Some(path) = &self.columns else { return Ok((given, self.input.unwrap_or_default())) };
+        let Some(path) = &self.columns else { return Ok((given, None)) };
         let (in_file, input) = columns_file::open(path)?;
         let in_table = |error| BadInput(format!("{}, [columns]: {error}", path.display()));
         let input = input.map(|name| name.parse().map_err(in_table)).transpose()?;
-        Ok((given.or(in_file), self.input.or(input).unwrap_or_default()))
+        Ok((given.or(in_file), input))
     }
 }
