@@ -32,6 +32,32 @@ fn what_the_tick_does_not_simulate_is_remarked_on_by_every_command_that_runs_it(
     }
 }
 
+/// A spring identified from a record of which the tick simulates little, and one of which it lacks little.
+#[test]
+fn an_oscillation_is_refused_above_three_percent_of_the_response_and_remarked_on_below() {
+    let folder = tempdir().unwrap();
+    let spring = |weight: f64| {
+        format!(
+            "schema = 1\n[relaxation]\nshare = 0.09\ntau_s = [5.5, 0.4]\nweights = [{}, 0.01]\n[[mode]]\nfreq_hz = 0.003\nzeta = 0.9\n\
+             weight = {weight}\nrate_weight = -0.3\n",
+            0.9 - weight
+        )
+    };
+    let said = |command: &str, weight: f64| {
+        std::fs::write(folder.path().join("plant.toml"), spring(weight)).unwrap();
+        let mut vsj = Command::new(env!("CARGO_BIN_EXE_vsj"));
+        let output = vsj.current_dir(folder.path()).arg(command).args(["--plant", "plant.toml"]).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for command in ["stair", "compare", "tune", "bound"] {
+        let (code, text) = said(command, 0.8);
+        let expected = "mode = 0.8 is not allowed: expected 0 to 0.03 of the settled response, because the tick takes oscillations as";
+        assert!(code == Some(2) && text.contains(expected) && text.lines().count() == 1, "{command}: {text}");
+    }
+    let (code, text) = said("stair", 0.02);
+    assert_eq!((code, &*text), (Some(0), "vsj: plant.toml: not simulated: mode (2.0 % of the settled response)\n"));
+}
+
 #[test]
 fn an_extended_spring_behind_its_recorded_amplifier() {
     let folder = tempdir().unwrap();

@@ -21,6 +21,9 @@ use crate::units::UnitNames;
 
 /// Largest size of a plant file, in MiB: some ten thousand times that of the longest that a diagnosis writes.
 const MOST_MIB: usize = 1;
+/// Largest part of the settled response that the tick may take as instantaneous although it oscillates. A step counts as reached at 97 %:
+/// a part above 3 % decides whether and when it is.
+const MOST_OSCILLATING: f64 = 0.03;
 /// Largest number of play operators, and of points of a law, that a host simulates; the tick has fewer.
 const MOST_LISTED: usize = 1000;
 
@@ -270,6 +273,24 @@ impl PlantFile {
         Ok(())
     }
 
+    /// Part of the settled response that oscillates, 0 or more: the magnitudes of the weights of all oscillations.
+    pub fn oscillating_part(&self) -> f64 {
+        if self.modes.is_empty() {
+            return 0.0;
+        }
+        let relaxation = self.extended().relaxation;
+        let settled = relaxation.share + relaxation.lags().map(|(_, weight)| weight).sum::<f64>();
+        self.modes.iter().map(|mode| mode.weight.abs()).sum::<f64>() / settled.abs()
+    }
+
+    /// Checks that next to nothing of the response is in oscillations, which the tick does not simulate.
+    fn check_oscillations(&self) -> Result<(), OutOfRange> {
+        let (value, unit) =
+            (self.oscillating_part(), "of the settled response, because the tick takes oscillations as instantaneous");
+        let refused = OutOfRange { field: "mode", value, lowest: 0.0, highest: MOST_OSCILLATING, unit };
+        if value <= MOST_OSCILLATING { Ok(()) } else { Err(refused) }
+    }
+
     /// Checks whether the tick can run the spring at 10 kHz; at a lower rate a short time constant may still be
     /// rejected.
     ///
@@ -278,14 +299,21 @@ impl PlantFile {
     pub fn check(&self) -> Result<(), OutOfRange> {
         let refused = |field, value, lowest, highest, unit| Err(OutOfRange { field, value, lowest, highest, unit });
         self.check_schema()?;
+        self.check_oscillations()?;
         let sample_time = SampleTime::from_rate(10_000.0)?;
-        match self.extended().plain() {
+        let checked = match self.extended().plain() {
             Some(plant) => plant.check(sample_time).map_err(|error| match error.field {
                 "share" => OutOfRange { field: "relaxation.share", ..error },
                 _ => OutOfRange { field: "relaxation.tau_s", ..error },
-            })?,
-            None => self.extended().check(sample_time)?,
-        }
+            }),
+            None => self.extended().check(sample_time),
+        };
+        checked.map_err(|error| match error.field {
+            "relaxation.share" if !self.modes.is_empty() => {
+                OutOfRange { unit: "of a step, together with the weight of [[mode]]", ..error }
+            }
+            _ => error,
+        })?;
         self.check_reading()?;
         let amplifier = self.amplifier.clone().unwrap_or_default();
         for (field, value, lowest, highest, unit) in [

@@ -9,10 +9,10 @@ use host_sim::output::terminal::{json, print};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
-use simulation::plant_file;
 use simulation::robust_bound::{Allowed, Question, answer};
 
 use super::identified::errors;
+use super::plant;
 use super::spring_error::ErrorOf;
 
 /// Compute how fast any controller without a sensor can be on a spring that is known only to within errors, and how well the spring has
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         bad_input!("--within-s {within_s}: expected a number above 0");
     }
     let spring_error = errors("--spring-error", &arguments.spring_error, arguments.identified.as_deref())?;
-    let file = plant_file::load(&arguments.plant)?;
+    let file = plant::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };
     let answer =

@@ -26,7 +26,12 @@ pub(crate) fn wire(name: &str) -> Result<(WireModel, Vec<String>)> {
 
 /// Remarks on effects that the tick does not simulate, and on a command that is no voltage.
 pub(crate) fn remark_on(name: &str, file: &PlantFile) {
-    let left_out = file.left_out();
+    let percent = 100.0 * file.oscillating_part();
+    let with_part = |effect: String| match effect.as_str() {
+        "mode" if percent > 0.0 => format!("mode ({percent:.1} % of the settled response)"),
+        _ => effect,
+    };
+    let left_out: Vec<String> = file.left_out().into_iter().map(with_part).collect();
     if !left_out.is_empty() {
         remark(&format!("{name}: not simulated: {}", left_out.join(", ")));
     }

@@ -120,3 +120,26 @@ fn effects_not_simulated_are_named_without_control_characters() {
     let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n[unmodelled]\ndrift = 1\n\"a\\nb\\u0000\" = 1\n";
     assert_eq!(parse("t", text).unwrap().left_out(), [r"a\nb\0", "drift"]);
 }
+
+/// The tick has no oscillation, so a spring that is mostly one is refused for that and not for what follows from it.
+#[test]
+fn an_oscillation_that_carries_the_response_is_refused_by_the_tick() {
+    let plain = "schema = 1\n[relaxation]\nshare = 0.0003\ntau_s = 0.03\n[[mode]]\nfreq_hz = 6\nzeta = 0.1\nweight = ";
+    for (weights, of_response) in [(vec![0.9997], 0.9997), (vec![0.02, -0.02], 0.04)] {
+        let second =
+            weights.get(1).map_or(String::new(), |w| format!("[[mode]]\nfreq_hz = 9\nzeta = 0.1\nweight = {w}\n"));
+        let text = format!("{plain}{}\n{second}", weights[0]);
+        let expected = format!(
+            "p, line 5, column 1: mode = {of_response} is not allowed: expected 0 to 0.03 of the settled response, because the tick \
+             takes oscillations as instantaneous"
+        );
+        assert_eq!(parse("p", &text).unwrap_err().to_string(), expected);
+        assert!(parse_for_host("p", &text).is_ok());
+    }
+    let small = parse("p", &format!("{plain}0.02\n")).unwrap();
+    assert_eq!(small.left_out(), ["mode"]);
+    // What the tick refuses is a sum that is not in the file.
+    let error = parse("p", &format!("{plain}0.02\n").replace("0.0003", "0.89")).unwrap_err().to_string();
+    assert!(error.starts_with("p, line 3, column 9: share = 0.91 is not allowed: expected 0 to 0.9"), "{error}");
+    assert!(error.ends_with("together with the weight of [[mode]]"), "{error}");
+}
