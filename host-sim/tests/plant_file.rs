@@ -58,6 +58,21 @@ fn an_oscillation_is_refused_above_three_percent_of_the_response_and_remarked_on
     assert_eq!((code, &*text), (Some(0), "vsj: plant.toml: not simulated: mode (2.0 % of the settled response)\n"));
 }
 
+/// A square law as an identification writes it, with more points than the tick takes.
+#[test]
+fn a_law_of_many_points_runs_with_a_remark_on_its_error() {
+    let folder = tempdir().unwrap();
+    let volts: Vec<f64> = (0..=32).map(|point| 600.0 * f64::from(point) / 32.0).collect();
+    let stiffness: Vec<f64> = volts.iter().map(|volts| volts * volts / 600.0).collect();
+    let file = format!(
+        "schema = 1\n[law]\nvoltage_v = {volts:?}\nstiffness = {stiffness:?}\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n"
+    );
+    let output = stair(folder.path(), &file, &["--controller", "none", "--json"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(said, "vsj: plant.toml: [law] of 33 points runs with 9, off by at most 0.39 % of its largest\n");
+    assert!(output.status.success());
+}
+
 #[test]
 fn an_extended_spring_behind_its_recorded_amplifier() {
     let folder = tempdir().unwrap();

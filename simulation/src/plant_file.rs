@@ -4,6 +4,7 @@
 //!
 //! The equations are those of [`model::extended`].
 
+mod law_of_tick;
 mod one_or_more;
 pub(crate) mod place;
 
@@ -11,6 +12,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use link::WireModel;
+use model::extended::law::MAX_POINTS;
 use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, Validate, extended};
 use serde::{Deserialize, Serialize};
 
@@ -328,6 +330,28 @@ impl PlantFile {
         Ok(())
     }
 
+    /// Replaces a law of more points than the tick takes by one that follows it, and checks the spring as [`PlantFile::check`] does.
+    fn for_tick(&mut self) -> Result<(), OutOfRange> {
+        if let Some(law) = self.law.as_ref().filter(|law| law.voltage_v.len() > MAX_POINTS) {
+            // The points are in order, and not too many.
+            self.check_for_host()?;
+            let (of_tick, off) = law.of_tick();
+            if off > law_of_tick::MOST_OFF {
+                let (lowest, highest) = (2.0, MAX_POINTS as f64);
+                let unit = "points, or more that lines through 9 of them follow to 0.5 % of the largest; `vsj diagnose` takes any law";
+                return Err(OutOfRange {
+                    field: "law.voltage_v",
+                    value: law.voltage_v.len() as f64,
+                    lowest,
+                    highest,
+                    unit,
+                });
+            }
+            self.law = Some(of_tick);
+        }
+        self.check()
+    }
+
     /// Checks whether the spring can be simulated in double precision, which has no ranges of its own: signs, list lengths and
     /// orders only.
     ///
@@ -457,7 +481,7 @@ impl PlantFile {
 /// [`crate::bad_input::BadInput`] with file, line, column and what was expected, also for values that [`PlantFile::check`]
 /// rejects.
 pub fn load(plant: &str) -> Result<PlantFile> {
-    load_checked(plant, PlantFile::check)
+    load_checked(plant, PlantFile::for_tick)
 }
 
 /// Loads like [`load`], for a simulation in double precision, which accepts every spring that passes
@@ -466,11 +490,11 @@ pub fn load(plant: &str) -> Result<PlantFile> {
 /// # Errors
 /// [`crate::bad_input::BadInput`] with file, line, column and what was expected.
 pub fn load_for_host(plant: &str) -> Result<PlantFile> {
-    load_checked(plant, PlantFile::check_for_host)
+    load_checked(plant, |file| file.check_for_host())
 }
 
-/// A check of a plant file's values.
-type Check = fn(&PlantFile) -> Result<(), OutOfRange>;
+/// A check of a plant file's values, which may change them into such as the tick can hold.
+type Check = fn(&mut PlantFile) -> Result<(), OutOfRange>;
 
 fn load_checked(plant: &str, check: Check) -> Result<PlantFile> {
     if plant == "paper" {
@@ -510,7 +534,7 @@ pub fn load_plain(plant: &str) -> Result<Plant> {
 /// # Errors
 /// The errors of [`load`].
 pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
-    parse_checked(name, text, PlantFile::check)
+    parse_checked(name, text, PlantFile::for_tick)
 }
 
 /// Parses like [`parse`], for a simulation in double precision, as [`load_for_host`] loads.
@@ -518,11 +542,11 @@ pub fn parse(name: &str, text: &str) -> Result<PlantFile> {
 /// # Errors
 /// The errors of [`load_for_host`].
 pub fn parse_for_host(name: &str, text: &str) -> Result<PlantFile> {
-    parse_checked(name, text, PlantFile::check_for_host)
+    parse_checked(name, text, |file| file.check_for_host())
 }
 
 fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
-    let file: PlantFile = toml::from_str(text).map_err(|error| {
+    let mut file: PlantFile = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
         let expected = "expected schema, [relaxation] share and tau_s, and the tables of a plant file";
         BadInput(format!("{}: {what}; {expected}", place::line_and_column(name, text, at)))
@@ -530,7 +554,7 @@ fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
     if let Some(names) = &file.units {
         names.units().map_err(|error| BadInput(format!("{name}, [units]: {error}")))?;
     }
-    if let Err(error) = check(&file) {
+    if let Err(error) = check(&mut file) {
         let at = place::of_field(text, error.field, error.value);
         // The position already shows the table.
         let field = error.field.rsplit('.').next().unwrap_or(error.field);

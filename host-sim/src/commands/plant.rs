@@ -21,6 +21,7 @@ pub(crate) fn wire(name: &str) -> Result<(WireModel, Vec<String>)> {
     if !left_out.is_empty() {
         remark(&format!("{name}: not run by the MCU: {}", left_out.join(", ")));
     }
+    remark_on_law(name, &file);
     Ok((file.wire().map_err(|error| BadInput(format!("{name}: {error}")))?, left_out))
 }
 
@@ -35,9 +36,20 @@ pub(crate) fn remark_on(name: &str, file: &PlantFile) {
     if !left_out.is_empty() {
         remark(&format!("{name}: not simulated: {}", left_out.join(", ")));
     }
+    remark_on_law(name, file);
     if let Some(unit) = file.units.as_ref().and_then(|units| units.other_command()) {
         remark(&format!(
             "{name}: the command is in {unit}: every V of target, voltage and stiffness is a {unit}, within the range of --limit-v"
         ));
+    }
+}
+
+/// Remarks on a law of which the tick runs fewer points than its file has.
+fn remark_on_law(name: &str, file: &PlantFile) {
+    let recorded = plant_file::load_for_host(name).ok().and_then(|file| file.law);
+    if let Some(law) = recorded.filter(|law| file.law.as_ref().is_some_and(|used| used != law)) {
+        let (used, off) = law.of_tick();
+        let (of, with, percent) = (law.voltage_v.len(), used.voltage_v.len(), 100.0 * off);
+        remark(&format!("{name}: [law] of {of} points runs with {with}, off by at most {percent:.2} % of its largest"));
     }
 }

@@ -143,3 +143,28 @@ fn an_oscillation_that_carries_the_response_is_refused_by_the_tick() {
     assert!(error.starts_with("p, line 3, column 9: share = 0.91 is not allowed: expected 0 to 0.9"), "{error}");
     assert!(error.ends_with("together with the weight of [[mode]]"), "{error}");
 }
+
+/// The law of an electrostatic spring as an identification writes it: 33 points of `v^2 / 500 V`.
+#[test]
+fn a_law_of_many_points_runs_on_nine_that_follow_it() {
+    let law = |value: fn(f64) -> f64| {
+        let voltage_v: Vec<f64> = (0..=32).map(|point| 500.0 * f64::from(point) / 32.0).collect();
+        let stiffness = voltage_v.iter().map(|&volts| value(volts)).collect();
+        PlantFile { law: Some(Law { voltage_v, stiffness }), ..Plant::PAPER.into() }
+    };
+    let square = law(|volts| volts * volts / 500.0);
+    let text = square.to_toml().unwrap();
+    let (of_tick, off) = square.law.as_ref().unwrap().of_tick();
+    assert_eq!(parse("p", &text).unwrap().law.unwrap(), of_tick);
+    assert_eq!(of_tick.voltage_v, (0..=8).map(|point| 62.5 * f64::from(point)).collect::<Vec<_>>());
+    assert!((off - 1.0 / 256.0).abs() < 1e-12, "{off}");
+    assert_eq!(parse_for_host("p", &text).unwrap(), square);
+    // Two straight lines need one point between them.
+    let bent = law(|volts| volts.min(300.0 - 0.5 * (300.0 - volts).min(0.0)));
+    assert!(bent.law.unwrap().of_tick().1 < 0.002);
+    let waves = law(|volts| volts + 60.0 * (volts / 15.0).sin()).to_toml().unwrap();
+    let error = parse("p", &waves).unwrap_err().to_string();
+    let expected = "voltage_v = 33 is not allowed: expected 2 to 9 points, or more that lines through 9 of them follow to 0.5 % of the";
+    assert!(error.contains(expected), "{error}");
+    assert!(parse_for_host("p", &waves).is_ok());
+}
