@@ -17,7 +17,7 @@ use model::{ExtendedPlant, OutOfRange, Plant, SampleTime, Validate, extended};
 use serde::{Deserialize, Serialize};
 
 use crate::bad_input;
-use crate::bad_input::BadInput;
+use crate::bad_input::{BadInput, excerpt, one_line};
 use crate::bounded_file::read_text;
 use crate::units::UnitNames;
 
@@ -545,6 +545,16 @@ pub fn parse_for_host(name: &str, text: &str) -> Result<PlantFile> {
     parse_checked(name, text, |file| file.check_for_host())
 }
 
+/// The unit of an error with the name of the command's unit where that takes the place of the volt.
+fn shown_unit(file: &PlantFile, unit: &str) -> String {
+    let command = file.units.as_ref().and_then(UnitNames::other_command);
+    let per_volt = unit.strip_prefix('V').filter(|rest| !rest.starts_with(char::is_alphabetic));
+    match (command, per_volt) {
+        (Some(command), Some(rest)) => format!("{}{rest}", one_line(&excerpt(command))),
+        _ => unit.to_owned(),
+    }
+}
+
 fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
     let mut file: PlantFile = toml::from_str(text).map_err(|error| {
         let (at, what) = (error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
@@ -558,7 +568,8 @@ fn parse_checked(name: &str, text: &str, check: Check) -> Result<PlantFile> {
         let at = place::of_field(text, error.field, error.value);
         // The position already shows the table.
         let field = error.field.rsplit('.').next().unwrap_or(error.field);
-        bad_input!("{}: {}", place::line_and_column(name, text, at), OutOfRange { field, ..error });
+        let unit = shown_unit(&file, error.unit);
+        bad_input!("{}: {}{unit}", place::line_and_column(name, text, at), OutOfRange { field, unit: "", ..error });
     }
     Ok(file)
 }

@@ -144,6 +144,20 @@ fn an_oscillation_that_carries_the_response_is_refused_by_the_tick() {
     assert!(error.ends_with("together with the weight of [[mode]]"), "{error}");
 }
 
+#[test]
+fn a_message_shows_the_unit_of_the_command() {
+    let bar = "schema = 1\n[units]\nvoltage = \"bar\"\n[relaxation]\nshare = 0.1\ntau_s = 1\n[amplifier]\n";
+    for (field, expected) in [("limit_v", "10 to 1000 bar"), ("slew_v_per_s", "1 to 1000000000 bar/s")] {
+        let error = parse("p", &format!("{bar}{field} = 0.5\n")).unwrap_err().to_string();
+        assert!(error.contains("line 8, column ") && error.ends_with(expected), "{error}");
+    }
+    let law = bar.replace("[relaxation]", "[law]\nvoltage_v = [5, 10]\nstiffness = [0, 10]\n[relaxation]");
+    assert!(parse("p", &law).unwrap_err().to_string().ends_with("expected 0 bar, where the law starts"));
+    // A number of the file is in V where the command is in kV.
+    let error = parse("p", &format!("{}limit_v = 0.5\n", bar.replace("bar", "kV"))).unwrap_err().to_string();
+    assert!(error.ends_with("expected 10 to 1000 V"), "{error}");
+}
+
 /// The law of an electrostatic spring as an identification writes it: 33 points of `v^2 / 500 V`.
 #[test]
 fn a_law_of_many_points_runs_on_nine_that_follow_it() {
