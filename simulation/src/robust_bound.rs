@@ -156,17 +156,8 @@ impl<'a> RobustBound<'a> {
 
     /// The springs at all ends of the errors, and then the nominal one.
     fn springs(&self, error: &SpringError) -> Vec<Linear> {
-        let mut ends = vec![SpringError::default()];
-        let mut nominal_too = false;
-        for parameter in Parameter::ALL {
-            let mut sizes = *error;
-            let size = *sizes.of(parameter);
-            if size != 0.0 {
-                nominal_too = true;
-                ends = ends.iter().flat_map(|end| [size, -size].map(|size| end.with(parameter, size))).collect();
-            }
-        }
-        if nominal_too {
+        let mut ends = error.ends(&[1.0, -1.0]);
+        if ends.len() > 1 {
             ends.push(SpringError::default());
         }
         ends.iter().map(|end| Linear::of(&DifferingSpring::new(self.file, end))).collect()
@@ -248,6 +239,19 @@ mod tests {
         let needed = bound.needed(Parameter::TimeConstant, 0.6, &[(0.0, 100.0)]).unwrap();
         let within = |size| bound.shortest_s(0.0, 100.0, &known(Parameter::TimeConstant, size)).unwrap() <= 0.6;
         assert!(within(needed) && !within(needed + 2e-3), "{needed}");
+    }
+
+    /// A share of 0 that may be a part of the response costs time as a share does that is known as well; a relative error of it says nothing.
+    #[test]
+    fn a_share_near_zero_costs_time_by_its_part_of_the_response() {
+        let file = PlantFile::from(Plant { share: 0.0, time_constant_s: 5.5 });
+        let bound = RobustBound::new(&file, allowed(None)).unwrap();
+        let time = |error| bound.shortest_s(400.0, 500.0, &error).unwrap();
+        let of_response = |part| SpringError { share_of_response: part, ..SpringError::default() };
+        let exact = time(SpringError::default());
+        assert_eq!(time(known(Parameter::Share, 0.9)), exact);
+        let [small, large] = [1e-5, 0.05].map(|part| time(of_response(part)));
+        assert!((small - exact).abs() < 0.02 * exact && large > 1.1 * exact, "{exact} {small} {large}");
     }
 
     /// Without the fall back the step takes longer; the time of the nominal spring alone costs a known spring nothing.

@@ -53,6 +53,15 @@ pub struct SpringError {
     pub time_constant: f64,
     /// Relative difference of the gain of the whole response.
     pub gain: f64,
+    /// Difference of the instantaneous share as a part of the settled response, which also says something of a share near 0. The share
+    /// that results is kept within 0 to 1.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub share_of_response: f64,
+}
+
+/// Returns true for 0; serde omits such a field.
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl SpringError {
@@ -69,6 +78,28 @@ impl SpringError {
     #[must_use]
     pub fn with(mut self, parameter: Parameter, error: f64) -> Self {
         *self.of(parameter) = error;
+        self
+    }
+
+    /// The errors of the springs at the ends of these errors: every combination in which each parameter that has an error is off by one of
+    /// these parts of it.
+    #[must_use]
+    pub fn ends(&self, parts: &[f64]) -> Vec<Self> {
+        let all = vec![*self];
+        Parameter::ALL.into_iter().filter(|parameter| self.is_off(*parameter)).fold(all, |ends, parameter| {
+            ends.iter().flat_map(|end| parts.iter().map(move |part| end.times(parameter, *part))).collect()
+        })
+    }
+
+    fn is_off(mut self, parameter: Parameter) -> bool {
+        *self.of(parameter) != 0.0 || parameter == Parameter::Share && self.share_of_response != 0.0
+    }
+
+    fn times(mut self, parameter: Parameter, part: f64) -> Self {
+        *self.of(parameter) *= part;
+        if parameter == Parameter::Share {
+            self.share_of_response *= part;
+        }
         self
     }
 }
@@ -89,7 +120,10 @@ impl DifferingSpring {
         let relaxation = &mut file.relaxation;
         let factor = 1.0 + error.time_constant;
         relaxation.tau_s.iter_mut().chain(&mut relaxation.tau_high_s).for_each(|tau| *tau *= factor);
-        let share = relaxation.share * (1.0 + error.share);
+        let share = match error.share_of_response {
+            0.0 => relaxation.share * (1.0 + error.share),
+            of_response => (relaxation.share * (1.0 + error.share) + of_response).clamp(0.0, 1.0),
+        };
         let later: f64 = relaxation.weights.iter().sum();
         if later != 0.0 {
             let left = (later + relaxation.share - share) / later;
@@ -172,6 +206,16 @@ mod tests {
                 assert!((settled(&of) - expected).abs() < 1e-6, "{parameter:?}");
             }
         }
+    }
+
+    /// Of a share of 0 a part is 0; a part of the response is not.
+    #[test]
+    fn an_error_as_a_part_of_the_response_changes_a_share_of_zero() {
+        let file = PlantFile::from(Plant { share: 0.0, time_constant_s: 40.0 });
+        let error = SpringError { share_of_response: 0.05, gain: 0.01, ..SpringError::default() };
+        let shares: Vec<f64> =
+            error.ends(&[1.0, -1.0]).iter().map(|end| DifferingSpring::new(&file, end).file.relaxation.share).collect();
+        assert_eq!(shares, [0.05, 0.05, 0.0, 0.0]);
     }
 
     #[test]

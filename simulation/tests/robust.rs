@@ -18,6 +18,7 @@ fn springs(margin: &Margin) -> Vec<SpringError> {
         time_constant: a * margin.time_constant,
         share: b * margin.share,
         gain: c * margin.gain,
+        ..SpringError::default()
     };
     let signs = || [-1.0, 0.0, 1.0].into_iter();
     let pairs = signs().flat_map(|a| signs().map(move |b| (a, b)));
@@ -81,7 +82,7 @@ fn without_a_sensor_every_spring_is_within_a_tenth_of_the_bound() {
                 .into_iter()
                 .map(|spring| last_step(&settings, &spring, &[(from, 100.0), (to, 12.0)], None));
             let (late_s, overshoot) = each.fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
-            let errors = SpringError { time_constant, share, gain };
+            let errors = SpringError { time_constant, share, gain, ..SpringError::default() };
             let shortest_s = bound.shortest_s(from, to, &errors).unwrap();
             println!("{margin:?} {from} V: {late_s} s of {shortest_s:.3} s, {:.2} %", 100.0 * overshoot);
             assert!(late_s <= 1.1 * shortest_s, "{margin:?} {from} V: {late_s} s, bound {shortest_s} s");
@@ -106,7 +107,7 @@ fn with_an_uncertain_time_constant_it_is_within_a_tenth_of_the_bound_for_which_n
             let (nominal_s, _) = step(SpringError::default());
             let each = springs(&margin).into_iter().map(step);
             let (late_s, overshoot) = each.fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
-            let error = SpringError { time_constant, share: 0.0, gain: 0.0 };
+            let error = SpringError { time_constant, ..SpringError::default() };
             let known_s = bound.shortest_s(from, to, &SpringError::default()).unwrap();
             let shortest_s = bound.shortest_with_nominal_s(from, to, &error, OF_KNOWN * known_s).unwrap();
             println!("{time_constant} {from} V: {nominal_s} of {known_s:.3} s, {late_s} s of {shortest_s:.3} s");
@@ -145,7 +146,7 @@ fn with_a_sensor_a_share_far_beyond_the_margin_overshoots_little_both_ways() {
     let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: OVERSHOOT };
     let feedback = Some(Feedback { noise_v: 1.0, interval_s: 1.0 / RATE_HZ, ..Feedback::TYPICAL });
     let settings = settings(Compensation::Robust(margin), feedback);
-    let spring = SpringError { time_constant: 0.0, share: 1.0, gain: 0.0 };
+    let spring = SpringError { share: 1.0, ..SpringError::default() };
     for targets in [[(0.0, 1.0), (100.0, 8.0)], [(900.0, 20.0), (800.0, 8.0)]] {
         let (_, overshoot) = last_step(&settings, &spring, &targets, Some(1.0));
         println!("{targets:?}: {:.2} %", 100.0 * overshoot);

@@ -176,6 +176,46 @@ fn the_documentation_shows_how_well_the_spring_has_to_be_known() {
     assert!(stdout.contains(&format!("{:.3}", times.fold(0.0, f64::max))), "{report} {stdout}");
 }
 
+/// A spring without an instantaneous share, as a record shows it: the error of the share is a part of the response.
+#[test]
+fn a_share_near_zero_is_known_to_a_part_of_the_response() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("plant.toml"), "schema = 1\n[relaxation]\nshare = 0.0\ntau_s = 4.0\n").unwrap();
+    let interval =
+        |value: f64, half: f64| serde_json::json!({"value": value, "low": value - half, "high": value + half});
+    let identified = |share: serde_json::Value, tau_half: f64| {
+        let nominal =
+            serde_json::json!({"gain": interval(2.0, 0.002), "share": share, "tau_s": [interval(4.0, tau_half)]});
+        fs::write(folder.path().join("identify.json"), serde_json::json!({ "nominal": nominal }).to_string()).unwrap();
+    };
+    let arguments = |command| [command, "--limit-v", "1000", "--plant", "plant.toml", "--identified", "identify.json"];
+    let slowest =
+        |json: &Value| json["steps"].as_array().unwrap().iter().map(|step| number(step, "t97_s")).fold(0.0, f64::max);
+    let mut times = Vec::new();
+    for half in [0.001, 0.06] {
+        identified(interval(-1e-5, half), 0.004);
+        let output = run(folder.path(), &[&arguments("bound")[..], &["--json"]].concat());
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+        let bound: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!((number(&bound["spring_error"], "share_of_response") - half).abs() < 1e-9, "{bound}");
+        times.push(slowest(&bound));
+    }
+    assert!(times[0] < 0.9 * times[1], "{times:?}");
+    let tuned = run(folder.path(), &arguments("tune"));
+    assert!(text(&tuned.stdout).contains("known to within errors: share to +-6.000 % of the response, time constant"));
+    let remark =
+        "vsj: the robust controller's margin is 25 % of a share of 0.000 %; its error is 6.000 % of the response\n";
+    assert_eq!(text(&tuned.stderr), remark);
+    for (share, tau_half, expected) in [
+        (interval(0.0, 0.02), 1.6, "vsj: --identified: time constant known to 40 %; expected 0 to 25\n"),
+        (interval(0.0, 2.0), 0.1, "vsj: --identified: share known to 200 % of the response; expected 0 to 100\n"),
+    ] {
+        identified(share, tau_half);
+        let output = run(folder.path(), &arguments("tune"));
+        assert_eq!((output.status.code(), text(&output.stderr)), (Some(2), expected.to_owned()));
+    }
+}
+
 #[test]
 fn what_cannot_be_run_is_one_line_and_exit_code_2() {
     let folder = tempdir().unwrap();

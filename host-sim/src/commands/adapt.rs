@@ -99,7 +99,7 @@ impl Arguments {
                 }
             }
         }
-        let SpringError { time_constant, share, gain } = within;
+        let SpringError { time_constant, share, gain, .. } = within;
         Ok(Settings { time_constant, share, gain, ..typical })
     }
 }

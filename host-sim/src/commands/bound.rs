@@ -11,7 +11,7 @@ use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
 use simulation::robust_bound::{Allowed, Question, answer};
 
-use super::identified::errors;
+use super::identified::{LARGEST, errors_with_small_shares};
 use super::plant;
 use super::spring_error::ErrorOf;
 
@@ -63,7 +63,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     if !(within_s.is_finite() && within_s > 0.0) {
         bad_input!("--within-s {within_s}: expected a number above 0");
     }
-    let spring_error = errors("--spring-error", &arguments.spring_error, arguments.identified.as_deref())?;
+    let (given, identified) = (&arguments.spring_error, arguments.identified.as_deref());
+    let spring_error = errors_with_small_shares("--spring-error", given, identified, LARGEST)?;
     let file = plant::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };

@@ -5,13 +5,16 @@ use std::path::Path;
 use anyhow::Result;
 use serde::Deserialize;
 use simulation::bad_input;
+use simulation::bad_input::number;
 use simulation::bounded_file::read_text;
 use simulation::spring_error::{Parameter, SpringError};
 
 use super::spring_error::{ErrorOf, together};
 
 /// Largest error of a parameter, relative.
-const LARGEST: f64 = 0.9;
+pub(super) const LARGEST: f64 = 0.9;
+/// The option that names the file of an identification.
+const IDENTIFIED: &str = "--identified";
 /// Instantaneous share that no step shows, relative to the static gain.
 const NEGLIGIBLE: f64 = 0.01;
 /// Largest size of an identification, in MiB.
@@ -38,9 +41,14 @@ struct Interval {
 }
 
 impl Interval {
+    /// Half the width.
+    fn half(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
     /// Half the width, relative to the value.
     fn relative(&self) -> f64 {
-        0.5 * (self.high - self.low) / self.value.abs()
+        self.half() / self.value.abs()
     }
 
     /// The same of an instantaneous share. One that is known to be next to nothing is known well, whatever its relative error.
@@ -50,33 +58,73 @@ impl Interval {
     }
 }
 
-/// The intervals of an identification as errors.
-fn of_identification(path: &Path) -> Result<SpringError> {
+/// What an identification says of its spring.
+fn of_file(path: &Path) -> Result<Nominal> {
     let text = read_text(path, MOST_MIB, "the JSON of `vsj identify`")?;
-    let Identified { nominal } = match serde_json::from_str(&text) {
-        Ok(identified) => identified,
+    match serde_json::from_str(&text) {
+        Ok(Identified { nominal }) => Ok(nominal),
         Err(error) => bad_input!("{}: {error}; expected the JSON of `vsj identify`", path.display()),
-    };
-    Ok(SpringError {
-        share: nominal.share.relative_of_share(),
-        time_constant: nominal.tau_s.iter().map(Interval::relative).fold(0.0, f64::max),
-        gain: nominal.gain.relative(),
-    })
+    }
 }
 
-/// The errors of the file `identified`, which `vsj identify --json` has printed, or without one those that an option gives.
+impl Nominal {
+    /// The intervals as errors, that of the share as it is given.
+    fn errors(&self, share: f64) -> SpringError {
+        let time_constant = self.tau_s.iter().map(Interval::relative).fold(0.0, f64::max);
+        SpringError { share, time_constant, gain: self.gain.relative(), ..SpringError::default() }
+    }
+}
+
+/// The errors of the file `identified`, which `vsj identify --json` has printed, or without one those that an option gives; each relative to
+/// its parameter.
 ///
 /// # Errors
 /// [`simulation::BadInput`] for an error that is negative or above 90 %, and for a file that is no identification.
 pub(super) fn errors(option: &str, given: &[ErrorOf], identified: Option<&Path>) -> Result<SpringError> {
-    let (option, mut spring_error) = match identified {
-        Some(path) => ("--identified", of_identification(path)?),
-        None => (option, together(option, given)?),
-    };
+    match identified {
+        None => checked(option, together(option, given)?, LARGEST),
+        Some(path) => {
+            let nominal = of_file(path)?;
+            checked(IDENTIFIED, nominal.errors(nominal.share.relative_of_share()), LARGEST)
+        }
+    }
+}
+
+/// The same errors, those of a file up to a largest one; that of a share that is not known to 90 % of itself is a part of the response.
+///
+/// # Errors
+/// [`simulation::BadInput`] for another error that is negative or too large, and for a file that is no identification.
+pub(super) fn errors_with_small_shares(
+    option: &str,
+    given: &[ErrorOf],
+    identified: Option<&Path>,
+    largest: f64,
+) -> Result<SpringError> {
+    match identified {
+        None => checked(option, together(option, given)?, LARGEST),
+        Some(path) => with_small_share(&of_file(path)?, largest),
+    }
+}
+
+fn with_small_share(nominal: &Nominal, largest: f64) -> Result<SpringError> {
+    let SpringError { time_constant, gain, .. } = checked(IDENTIFIED, nominal.errors(0.0), largest)?;
+    let relative = nominal.share.relative();
+    let of_itself = (0.0..=LARGEST).contains(&relative);
+    let (share, share_of_response) = if of_itself { (relative, 0.0) } else { (0.0, nominal.share.half()) };
+    if !(0.0..=1.0).contains(&share_of_response) {
+        let percent = number(100.0 * share_of_response);
+        bad_input!("{IDENTIFIED}: share known to {percent} % of the response; expected 0 to 100");
+    }
+    Ok(SpringError { share, time_constant, gain, share_of_response })
+}
+
+/// Checks that each relative error of an option is between 0 and a largest one.
+fn checked(option: &str, mut spring_error: SpringError, largest: f64) -> Result<SpringError> {
     for parameter in Parameter::ALL {
         let error = *spring_error.of(parameter);
-        if !(0.0..=LARGEST).contains(&error) {
-            bad_input!("{option}: {} known to {} %; expected 0 to 90", parameter.name(), 100.0 * error);
+        if !(0.0..=largest).contains(&error) {
+            let [percent, most] = [error, largest].map(|error| number(100.0 * error));
+            bad_input!("{option}: {} known to {percent} %; expected 0 to {most}", parameter.name());
         }
     }
     Ok(spring_error)

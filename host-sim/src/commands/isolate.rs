@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
         Some(noise_v) => noise_v,
         None => bad_input!("{}: fewer than 10 readings; expected more, or --noise-v", record.name),
     };
-    let SpringError { time_constant, share, gain } =
+    let SpringError { time_constant, share, gain, .. } =
         errors("--known", &arguments.known, arguments.identified.as_deref())?;
     let settings = Settings {
         plant: plant.plain(&arguments.plant)?,

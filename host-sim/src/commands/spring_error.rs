@@ -67,7 +67,7 @@ pub(super) struct Known {
 impl Known {
     /// The robust controller's margin; `None` without `--known`.
     pub(super) fn margin(&self) -> Result<Option<Margin>> {
-        let SpringError { share, time_constant, gain } = together("--known", &self.known)?;
+        let SpringError { share, time_constant, gain, .. } = together("--known", &self.known)?;
         let overshoot = self.overshoot_percent / 100.0;
         Ok((!self.known.is_empty()).then_some(Margin { time_constant, share, gain, overshoot }))
     }

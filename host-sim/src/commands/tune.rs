@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::Files;
-use host_sim::output::terminal::{json, print, wrote};
+use host_sim::output::terminal::{json, print, remark, wrote};
 use host_sim::output::tune as output;
-use model::Amplifier;
+use model::{Amplifier, Margin};
 use simulation::bad_input;
 use simulation::option_names::{SETTINGS, named};
 use simulation::tune::{Knowledge, Specification, tune};
 
-use super::identified::errors;
+use super::identified::errors_with_small_shares;
 use super::plant;
 use super::spring_error::ErrorOf;
 
@@ -69,7 +69,8 @@ impl Arguments {
         if self.known.is_empty() && self.identified.is_none() {
             return Ok(None);
         }
-        let spring_error = errors("--known", &self.known, self.identified.as_deref())?;
+        let largest = Margin::LARGEST_ERROR;
+        let spring_error = errors_with_small_shares("--known", &self.known, self.identified.as_deref(), largest)?;
         Ok(Some(Knowledge { spring_error, within_s }))
     }
 }
@@ -87,6 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let specification =
         Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent, knowledge };
     let answer = tune(&specification).map_err(|error| named(error, SETTINGS))?;
+    answer.uncertainty.iter().flat_map(|uncertainty| &uncertainty.remarks).for_each(|text| remark(text));
     let json = json(&answer)?;
     let text = output::text(&answer, &arguments.plant);
     let mut written = String::new();

@@ -44,12 +44,14 @@ pub fn text(answer: &Answer) -> String {
 /// The errors to within which a spring is known.
 pub(crate) fn errors(spring_error: &SpringError) -> String {
     let mut error = *spring_error;
-    let known: Vec<String> = Parameter::ALL
+    let of_response = 100.0 * error.share_of_response;
+    let share = (of_response != 0.0).then(|| format!("share to +-{of_response:.3} % of the response"));
+    let relative = Parameter::ALL
         .into_iter()
         .map(|parameter| (parameter.name(), 100.0 * *error.of(parameter)))
         .filter(|(_, percent)| *percent != 0.0)
-        .map(|(name, percent)| format!("{name} to +-{percent:.3} %"))
-        .collect();
+        .map(|(name, percent)| format!("{name} to +-{percent:.3} %"));
+    let known: Vec<String> = share.into_iter().chain(relative).collect();
     if known.is_empty() { "none".to_owned() } else { known.join(", ") }
 }
 

@@ -78,7 +78,7 @@ pub fn text(tuning: &Tuning, plant: &str) -> String {
 
 /// The controllers on a spring that is known to within errors.
 fn within_errors(uncertainty: &Uncertainty) -> String {
-    let Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed } = uncertainty;
+    let Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed, .. } = uncertainty;
     let mut text = format!("\nOn a spring that is known to within errors: {}.\n", errors(spring_error));
     line(&mut text, "Not exceeded on 95 % of these springs, and at all ends of the errors (guaranteed):");
     line(&mut text, "           |      nominal       |   worst at 95 %    |     guaranteed");

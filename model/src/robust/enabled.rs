@@ -13,8 +13,6 @@ use crate::validated::{Validate, Validated};
 const MISSING: f64 = 0.03;
 /// Largest change of the voltage in the direction of a step while the sensor is trusted, in V/s.
 const RISE_V_PER_S: f64 = 20e3;
-/// Largest relative error of a parameter.
-const LARGEST_ERROR: f64 = 0.25;
 
 /// How well the spring is known, and what it may overshoot; all without a unit.
 ///
@@ -45,6 +43,9 @@ pub struct Margin {
 }
 
 impl Margin {
+    /// Largest relative error of a parameter, both ways.
+    pub const LARGEST_ERROR: f64 = 0.25;
+
     /// Time constants and share are known to within 5 %; the gain is exact, which no controller without a sensor can correct; 2 % of
     /// overshoot are allowed.
     pub const TYPICAL: Self = Self { time_constant: 0.05, share: 0.05, gain: 0.0, overshoot: 0.02 };
@@ -70,9 +71,9 @@ impl Margin {
 
 impl Validate for Margin {
     fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
-        OutOfRange::check("margin.time_constant", self.time_constant, 0.0..=LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.share", self.share, 0.0..=LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.gain", self.gain, 0.0..=LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.time_constant", self.time_constant, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.share", self.share, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
+        OutOfRange::check("margin.gain", self.gain, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
         OutOfRange::check("margin.overshoot", self.overshoot, 0.0..=0.2, "of a step")
     }
 }

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::control_loop::{Controller, gains};
 use crate::robust_bound::{Allowed, Needed, RobustBound};
-use crate::spring_error::{DifferingSpring, Parameter, SpringError};
+use crate::spring_error::{DifferingSpring, SpringError};
 use crate::tune::Specification;
 use crate::tune::trade::with_errors;
 use crate::tune::worst::Worst;
@@ -50,6 +50,9 @@ pub struct Uncertainty {
     pub overshoot_percent: f64,
     /// How well each parameter alone has to be known for it, whatever the controller; `None` for a spring that is not linear.
     pub needed: Option<Needed>,
+    /// What the user should know about the robust controller, one line each.
+    #[serde(skip)]
+    pub remarks: Vec<String>,
 }
 
 /// A controller on a spring that is known to within errors.
@@ -68,7 +71,7 @@ pub struct Within {
 /// Evaluates the controllers; `fast` is the tuned time-optimal one.
 ///
 /// # Errors
-/// [`crate::BadInput`] for errors beyond those that the robust controller accepts, and for springs that cannot be.
+/// [`crate::BadInput`] for errors of time constant and gain beyond those that the robust controller accepts, and for springs that cannot be.
 pub(super) fn evaluate(
     specification: &Specification<'_>,
     fast: Compensation,
@@ -76,9 +79,10 @@ pub(super) fn evaluate(
 ) -> Result<Uncertainty> {
     let Specification { file, amplifier, overshoot_percent, .. } = *specification;
     let Knowledge { spring_error, within_s } = *knowledge;
-    let SpringError { share, time_constant, gain } = spring_error;
+    let SpringError { time_constant, gain, .. } = spring_error;
     let overshoot = overshoot_percent / 100.0;
-    let ends = ends(&spring_error);
+    let (share, remarks) = share_margin(file.relaxation.share, &spring_error);
+    let ends = spring_error.ends(&[-1.0, 0.0, 1.0]);
     ends.iter().try_for_each(|error| DifferingSpring::new(file, error).check())?;
     let drawn = drawn(&spring_error);
     let margin = Margin { time_constant, share, gain, overshoot };
@@ -102,30 +106,40 @@ pub(super) fn evaluate(
     let controllers = controllers.collect::<Result<_>>()?;
     let bound = RobustBound::new(file, Allowed { amplifier, overshoot }).ok();
     let needed = bound.map(|bound| Needed::of(&bound, within_s));
-    Ok(Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed })
+    Ok(Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed, remarks })
 }
 
-/// The errors at all ends and middles of the intervals.
-fn ends(error: &SpringError) -> Vec<SpringError> {
-    let mut ends = vec![SpringError::default()];
-    for parameter in Parameter::ALL {
-        let size = *error.clone().of(parameter);
-        if size != 0.0 {
-            ends = ends.iter().flat_map(|end| [-size, 0.0, size].map(|size| end.with(parameter, size))).collect();
-        }
-    }
-    ends
+/// The robust controller's margin for the share, and a remark if it is less than the error. The controller takes it relative to the share,
+/// which says little of a small one.
+fn share_margin(share: f64, spring_error: &SpringError) -> (f64, Vec<String>) {
+    let of_response = spring_error.share * share + spring_error.share_of_response;
+    let relative = spring_error.share_of_response / share;
+    let known = if relative.is_nan() { spring_error.share } else { spring_error.share + relative };
+    let margin = known.min(Margin::LARGEST_ERROR);
+    let remark = (known > margin).then(|| {
+        let [margin, share, of_response] = [100.0 * margin, 100.0 * share, 100.0 * of_response];
+        format!(
+            "the robust controller's margin is {margin:.0} % of a share of {share:.3} %; its error is {of_response:.3} % of the response"
+        )
+    });
+    (margin, remark.into_iter().collect())
 }
 
 /// Errors of springs that are drawn from the intervals, the same in each call.
 fn drawn(error: &SpringError) -> Vec<SpringError> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let mut part = |size: f64| {
-        let deviations: f64 = StandardNormal.sample(&mut random);
-        size / DEVIATIONS * deviations
+    let SpringError { share, time_constant, gain, share_of_response } = *error;
+    let mut draw = || {
+        let [of_share, of_time_constant, of_gain] =
+            std::array::from_fn(|_| -> f64 { StandardNormal.sample(&mut random) });
+        let part = |size: f64, deviations: f64| size / DEVIATIONS * deviations;
+        SpringError {
+            share: part(share, of_share),
+            time_constant: part(time_constant, of_time_constant),
+            gain: part(gain, of_gain),
+            share_of_response: part(share_of_response, of_share),
+        }
     };
-    let SpringError { share, time_constant, gain } = *error;
-    let mut draw = || SpringError { share: part(share), time_constant: part(time_constant), gain: part(gain) };
     (0..DRAWN).map(|_| draw()).collect()
 }
 
@@ -148,6 +162,7 @@ fn quantile(each: &[Worst]) -> Worst {
 mod tests {
     use super::*;
     use crate::plant_file::PlantFile;
+    use crate::spring_error::Parameter;
     use model::{Amplifier, Approach, Plant};
 
     #[test]
@@ -182,5 +197,18 @@ mod tests {
         }
         let share = found.needed.and_then(|needed| needed.share).unwrap();
         assert!((0.05..0.08).contains(&share), "{share}");
+    }
+
+    /// The margin is relative to the share, and the error of a share near 0 is not.
+    #[test]
+    fn a_small_share_gets_the_largest_margin_and_a_remark() {
+        let of_response = |share_of_response| SpringError { share_of_response, ..SpringError::default() };
+        assert_eq!(share_margin(0.1, &SpringError { share: 0.2, ..SpringError::default() }), (0.2, Vec::new()));
+        let (margin, remarks) = share_margin(0.1, &of_response(0.01));
+        assert!((margin - 0.1).abs() < 1e-12 && remarks.is_empty(), "{margin} {remarks:?}");
+        for share in [0.0, 0.001] {
+            let (margin, remarks) = share_margin(share, &of_response(0.05));
+            assert!(margin == Margin::LARGEST_ERROR && remarks[0].ends_with("5.000 % of the response"), "{remarks:?}");
+        }
     }
 }
