@@ -369,6 +369,7 @@ class Identified(Answer):
     remarks: List[str]
     unit: str
     model: Optional[str]
+    bound_command: Optional[str]
     plant: str = field(init=False, repr=False, compare=False)
     courses: list = field(init=False, repr=False, compare=False)
 

@@ -53,6 +53,11 @@ fn a_force_in_newtons_is_identified() {
         assert!((of("value") - expected).abs() < near, "{quantity}: {report}");
         assert!(of("low") <= of("value") && of("value") <= of("high"), "{quantity}: {report}");
     }
+    // The spring is linear, and its command is in V: whether it can be quick enough is the next question.
+    let command = report["bound_command"].as_str().unwrap();
+    assert_eq!(command, "vsj bound --plant made/plant.toml --identified made/identify.json");
+    let said = run(folder.path(), &["identify", "force.csv", "--column", "force", "--out", "made"]);
+    assert!(text(&said.stdout).contains(&format!("How fast a controller can be with what is known: {command}\n")));
     let held_out = number(&report, "/held_out_rmse");
     assert!((0.0028..0.0031).contains(&held_out), "{held_out}: uniform noise of 0.01 N");
     let linear = report["linear"].as_array().unwrap();
@@ -64,6 +69,15 @@ fn a_force_in_newtons_is_identified() {
     }
     let page = fs::read_to_string(folder.path().join("made/report.html")).unwrap();
     assert!(page.contains("600 readings show one time constant.") && page.contains("<svg"));
+    let bound = run(folder.path(), &command.split(' ').skip(1).collect::<Vec<_>>());
+    assert!(bound.status.success(), "{}", text(&bound.stderr));
+    let other = record(7.0).replace("voltage_v", "current_A");
+    fs::write(folder.path().join("current.csv"), other).unwrap();
+    let options = ["--voltage", "current_A:A", "--reading", "force:N", "--json", "--out", "other"];
+    assert_eq!(
+        json(folder.path(), &[&["identify", "current.csv"][..], &options].concat())["bound_command"],
+        Value::Null
+    );
     let written: Value = serde_json::from_slice(&fs::read(folder.path().join("made/identify.json")).unwrap()).unwrap();
     assert_eq!(written, report);
     let plant = fs::read_to_string(folder.path().join("made/plant.toml")).unwrap();
@@ -77,7 +91,7 @@ fn two_records_of_one_spring_have_their_own_zeros() {
     fs::write(folder.path().join("b.csv"), record(-4.0)).unwrap();
     let report = json(folder.path(), &["identify", "a.csv", "b.csv", "--column", "force", "--json"]);
     assert_eq!(report["rows"], 1200);
-    assert_eq!(report["model"], Value::Null);
+    assert_eq!((&report["model"], &report["bound_command"]), (&Value::Null, &Value::Null));
     for (record, zero) in [(0, 7.0), (1, -4.0)] {
         assert!((number(&report, &format!("/start/{record}/zero/value")) - zero).abs() < 0.01, "{report}");
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use simulation::bad_input;
 use simulation::bad_input::number;
 use simulation::bounded_file::read_text;
@@ -104,6 +104,12 @@ pub(super) fn errors_with_small_shares(
         None => checked(option, together(option, given)?, LARGEST),
         Some(path) => with_small_share(&of_file(path)?, largest),
     }
+}
+
+/// True if `vsj bound` takes the intervals of an identification, which is given as it is printed, as errors.
+pub(super) fn bounds_take(identification: &impl Serialize) -> bool {
+    let read = serde_json::to_value(identification).and_then(serde_json::from_value);
+    read.is_ok_and(|Identified { nominal }| with_small_share(&nominal, LARGEST).is_ok())
 }
 
 fn with_small_share(nominal: &Nominal, largest: f64) -> Result<SpringError> {

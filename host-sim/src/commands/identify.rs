@@ -1,17 +1,21 @@
 //! `vsj identify`: the linear spring that records show.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
 use host_sim::output::files::{Files, PLANT_FILE};
 use host_sim::output::identify::{self as output, Origin};
-use host_sim::output::terminal::{json, print, wrote};
-use identify::{Input, identify};
+use host_sim::output::terminal::{json, print, quoted, wrote};
+use identify::{Identified, Input, identify};
+use model::Amplifier;
 use simulation::bad_input;
+use simulation::plant_file;
 use simulation::record::Record;
+use simulation::robust_bound::{Allowed, RobustBound};
 
 use super::diagnose::command_line;
+use super::identified::bounds_take;
 use super::record_arguments::RecordArguments;
 
 /// Find the spring that records show: gain, zero, instantaneous share, delay, time constants, start, noise
@@ -55,6 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let mut identified = identify(&records, input, &units)?;
     if let Some(folder) = &arguments.out {
         identified.report.model = Some(folder.join(PLANT_FILE).display().to_string());
+        identified.report.bound_command = bound_command(folder, &identified)?;
     }
     let paths = match files {
         Some(files) => output::write(files, &identified, &units, &Origin { command: command_line() })?,
@@ -65,4 +70,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     } else {
         output::text::text(&identified, &units) + &wrote(&paths)
     })
+}
+
+/// The command line of `vsj bound` on the spring and its intervals, once they are written to a folder; `None` if it does not take them.
+fn bound_command(folder: &Path, identified: &Identified) -> Result<Option<String>> {
+    let Identified { plant, report, .. } = identified;
+    // Its steps are in V.
+    let is_in_volts = plant.units.as_ref().is_none_or(|units| units.other_command().is_none());
+    let allowed = Allowed { amplifier: Amplifier::up_to(Amplifier::MOST_V), overshoot: 0.0 };
+    let is_linear = RobustBound::new(plant, allowed).is_ok();
+    let runs = plant_file::parse(PLANT_FILE, &plant.to_toml()?).is_ok();
+    let [plant, answer] =
+        [PLANT_FILE, output::ANSWER_FILE].map(|name| quoted(&folder.join(name).display().to_string()));
+    let takes = is_in_volts && is_linear && runs && bounds_take(report);
+    Ok(takes.then(|| format!("vsj bound --plant {plant} --identified {answer}")))
 }

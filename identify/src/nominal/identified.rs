@@ -137,6 +137,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         zero_shifts: Vec::new(),
         unit: reading.into(),
         model: None,
+        bound_command: None,
     };
     report.remarks = remarks::remarks(&report, problem, fit, units);
     let doubts = remarks::doubts(&report, problem, fit, units);

@@ -165,4 +165,7 @@ pub struct Report {
     pub unit: String,
     /// Path of the plant file that was written; `None` if none was.
     pub model: Option<String>,
+    /// Command line that computes how fast a controller can be with what is known of this spring; `None` if no files were written or
+    /// `vsj bound` does not take the spring.
+    pub bound_command: Option<String>,
 }

@@ -20,6 +20,9 @@ pub struct Origin {
     pub command: String,
 }
 
+/// Name of the file with the answer.
+pub const ANSWER_FILE: &str = "identify.json";
+
 /// Writes all files; returns their paths.
 ///
 /// # Errors
@@ -31,7 +34,7 @@ pub fn write(mut files: Files, identified: &Identified, units: &Units, origin: &
     let names: Vec<String> = identified.records.iter().map(|record| record.name.replace(['\n', '\r'], " ")).collect();
     let plant = identified.plant.to_toml()?;
     files.add(PLANT_FILE, |out| write!(out, "# Identified from {}\n{plant}", names.join(", ")))?;
-    let answer = serde_json::to_string_pretty(&identified.report).context("identify.json")?;
-    files.add("identify.json", |out| writeln!(out, "{answer}"))?;
+    let answer = serde_json::to_string_pretty(&identified.report).context(ANSWER_FILE)?;
+    files.add(ANSWER_FILE, |out| writeln!(out, "{answer}"))?;
     files.finish()
 }

@@ -30,5 +30,8 @@ pub fn text(identified: &Identified, units: &Units) -> String {
     for remark in &report.remarks {
         line(&mut text, remark);
     }
+    if let Some(command) = &report.bound_command {
+        line(&mut text, &format!("How fast a controller can be with what is known: {command}"));
+    }
     text
 }
