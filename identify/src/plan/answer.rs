@@ -1,6 +1,7 @@
 //! The data types of a plan. Names of fields are part of the interface.
 
 use serde::Serialize;
+use simulation::units::Unit;
 
 /// The next experiment and what it is predicted to show.
 #[derive(Clone, Debug, Serialize)]
@@ -32,6 +33,9 @@ pub struct Plan {
     /// Name of the reading's unit.
     #[serde(skip)]
     pub reading_unit: String,
+    /// Unit of the commanded voltage in the record, in which a user reads it.
+    #[serde(skip)]
+    pub command_unit: Unit,
     /// What limits the plan, in sentences.
     pub remarks: Vec<String>,
 }

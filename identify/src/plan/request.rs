@@ -5,6 +5,7 @@ use serde::Deserialize;
 use simulation::bad_input;
 use simulation::bad_input::{BadInput, number};
 use simulation::plant_file::PlantFile;
+use simulation::units::Unit;
 
 use crate::answer::SCHEMA;
 use crate::hypotheses::{Experiment, Rival};
@@ -113,12 +114,14 @@ impl Request {
         Ok(())
     }
 
-    /// Returns the frame of the schedules that this request allows after an experiment with a nominal spring.
+    /// Returns the frame of the schedules that this request allows after an experiment with a nominal spring; a command in another unit
+    /// than volts has it in messages.
     ///
     /// # Errors
     /// [`simulation::bad_input::BadInput`] with the option, its value and the allowed range.
-    pub(super) fn frame(&self, experiment: &Experiment, plant: &PlantFile) -> Result<Frame> {
+    pub(super) fn frame(&self, experiment: &Experiment, command: &Unit, plant: &PlantFile) -> Result<Frame> {
         self.check()?;
+        let unit = if command.is_voltage() { "V" } else { &command.name };
         let second_s = experiment.coordinates.second_s;
         let duration_s = self.minutes.map_or(DEFAULT_DURATION_S * second_s, |minutes| 60.0 * minutes);
         // A time between readings that is computed from decimal times is off by a rounding error.
@@ -137,14 +140,14 @@ impl Request {
         let most_v = if widest > AMPLIFIER_LIMIT_V { widest } else { AMPLIFIER_LIMIT_V };
         if let Some(limit_v) = self.limit_v {
             if !(limit_v > 0.0 && limit_v <= most_v) {
-                bad_input!("--limit-v {}: expected above 0, at most {} V", number(limit_v), number(most_v));
+                bad_input!("--limit-v {}: expected above 0, at most {} {unit}", number(limit_v), number(most_v));
             }
             // The sign of the record's voltages stays.
             let scale = if widest > 0.0 { limit_v / widest } else { 0.0 };
             (low_v, high_v) = if widest > 0.0 { (low_v * scale, high_v * scale) } else { (0.0, limit_v) };
         }
         if low_v == high_v {
-            bad_input!("--limit-v: expected, because the voltage of the record is always 0 V");
+            bad_input!("--limit-v: expected, because the voltage of the record is always 0 {unit}");
         }
         let slew = self.slew_v_per_s.unwrap_or(f64::INFINITY);
         let volt_v = experiment.coordinates.volt_v;
@@ -159,7 +162,7 @@ impl Request {
         if frame.rows_to_zero() > frame.rows / 4 {
             let least = 4.0 * (high_v - low_v) / duration_s;
             bad_input!(
-                "--slew-v-per-s {}: expected at least {} V/s, a quarter of the time for the whole range",
+                "--slew-v-per-s {}: expected at least {} {unit}/s, a quarter of the time for the whole range",
                 number(slew),
                 number(least)
             );

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use simulation::plant_file::parse_for_host;
+use simulation::units::Unit;
 
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
@@ -57,7 +58,8 @@ pub fn plan(basis: &Basis, request: &Request, name: &str) -> Result<Plan> {
 fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> Result<(Design, Vec<String>)> {
     let experiment = basis.experiment(name)?;
     let plant = parse_for_host(&format!("{name}, field experiment.plant"), &experiment.plant)?;
-    let frame = request.frame(experiment, &plant)?;
+    let command_unit = Unit::of_voltage(plant.units.as_ref().and_then(|units| units.voltage.as_deref()).unwrap_or("V"));
+    let frame = request.frame(experiment, &command_unit, &plant)?;
     let coordinates = experiment.coordinates;
     let base = Base::new(plant)?.normalised(&normalisation(&coordinates));
     let whitening = Whitening::new(&experiment.noise, &frame);
@@ -66,6 +68,7 @@ fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> 
         coordinates,
         noise: experiment.noise.clone(),
         reading_unit: experiment.reading_unit.clone(),
+        command_unit,
         base,
         whitening,
         hypotheses: Vec::new(),
@@ -167,9 +170,12 @@ fn at_limit(design: &Design, commands: &Commands) -> Option<String> {
     let frame = &design.frame;
     let top_v = frame.high_v.max(-frame.low_v);
     let used = commands.held.iter().any(|held| (held.1.abs() - top_v).abs() < 1e-6 * top_v);
-    let limit_v = top_v * design.coordinates.volt_v;
+    let Unit { name, si } = &design.command_unit;
+    let limit = top_v * design.coordinates.volt_v / si;
     used.then(|| {
-        format!("the voltage stays within the {limit_v:.4} V of the record; --limit-v allows more if the spring does")
+        format!(
+            "the voltage stays within the {limit:.4} {name} of the record; --limit-v allows more if the spring does"
+        )
     })
 }
 
@@ -220,6 +226,7 @@ fn finished(
         commands: held.chain([end]).collect(),
         responses: responses(design, commands),
         reading_unit: design.reading_unit.clone(),
+        command_unit: design.command_unit.clone(),
         remarks,
     }
 }

@@ -10,6 +10,7 @@
 //! about a time constant of `tau` rows, over which `i`, the information of one reading, cannot reduce it.
 
 use nalgebra::{DMatrix, DVector};
+use simulation::units::Unit;
 
 use crate::effects::EFFECTS;
 use crate::effects::effect::FitContext;
@@ -36,6 +37,8 @@ pub(super) struct Design {
     pub(super) noise: FittedNoise,
     /// Name of the reading's unit.
     pub(super) reading_unit: String,
+    /// Unit of the commanded voltage in the record.
+    pub(super) command_unit: Unit,
     pub(super) base: Base,
     pub(super) whitening: Whitening,
     /// What the plan is to decide between, the likeliest first; at least one.

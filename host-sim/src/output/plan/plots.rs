@@ -1,6 +1,7 @@
 //! Plots of a plan as SVG.
 
 use identify::plan::Plan;
+use simulation::units::Unit;
 
 use crate::output::chart::{COLOURS, Chart, Series};
 use crate::output::colours::COMMAND;
@@ -21,13 +22,14 @@ pub(super) fn figures(plan: &Plan) -> Vec<(&'static str, String)> {
 
 /// The commanded voltage over time, with its steps.
 fn schedule(plan: &Plan) -> String {
+    let Unit { name, si } = &plan.command_unit;
     let points = plan
         .commands
         .windows(2)
-        .flat_map(|pair| [(pair[0].time_s, pair[0].voltage_v), (pair[1].time_s, pair[0].voltage_v)]);
-    let end = plan.commands.last().map(|last| (last.time_s, last.voltage_v));
+        .flat_map(|pair| [(pair[0].time_s, pair[0].voltage_v / si), (pair[1].time_s, pair[0].voltage_v / si)]);
+    let end = plan.commands.last().map(|last| (last.time_s, last.voltage_v / si));
     let series = Series::line("commanded", COMMAND, points.chain(end).collect());
-    Chart::new("Schedule", "time [s]", "voltage [V]", vec![series]).file()
+    Chart::new("Schedule", "time [s]", &format!("voltage [{name}]"), vec![series]).file()
 }
 
 fn responses(plan: &Plan, title: &str, y: &str, less: impl Fn(usize) -> f64) -> String {

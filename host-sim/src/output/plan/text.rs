@@ -7,6 +7,7 @@ use identify::plan::answer::{Part, Separation, Sharper, Suspected};
 use model::Amplifier;
 use simulation::bad_input::number as exact;
 use simulation::plant_file;
+use simulation::units::Unit;
 
 use crate::output::cells::line;
 use crate::output::diagnosis::number::number;
@@ -34,9 +35,12 @@ pub fn text(plan: &Plan) -> String {
         line(&mut text, &format!("{}.", capitalised(remark)));
     }
     line(&mut text, "");
-    line(&mut text, &format!("{:>10} {:>10} {:>10}        separates", "from s", "to s", "to V"));
+    line(
+        &mut text,
+        &format!("{:>10} {:>10} {:>10}        separates", "from s", "to s", format!("to {}", plan.command_unit.name)),
+    );
     for part in plan.parts.iter().take(MOST_PARTS) {
-        line(&mut text, &of_part(part));
+        line(&mut text, &of_part(part, &plan.command_unit));
     }
     if !plan.separations.is_empty() {
         let all = plan.separations.len() <= MOST_SEPARATIONS;
@@ -51,7 +55,7 @@ pub fn text(plan: &Plan) -> String {
         line(&mut text, "");
         line(&mut text, "95 % interval of the likeliest set, +-  now           planned");
         for it in &plan.intervals {
-            line(&mut text, &of_interval(it));
+            line(&mut text, &of_interval(it, plan));
         }
     }
     text
@@ -95,8 +99,9 @@ pub fn how_to_play(plan: &Plan, spring: &str) -> String {
 }
 
 fn sentence(plan: &Plan) -> String {
-    let [low, high] = plan.range_v.map(number);
-    let schedule = format!("{} minutes between {low} and {high} V", number(plan.minutes));
+    let Unit { name, si } = &plan.command_unit;
+    let [low, high] = plan.range_v.map(|volts| number(volts / si));
+    let schedule = format!("{} minutes between {low} and {high} {name}", number(plan.minutes));
     match plan.probability {
         Some(probability) => format!(
             "{schedule} decide between {} sets of causes with a predicted probability of {probability:.3}:",
@@ -128,28 +133,31 @@ fn of_suspect(suspect: &Suspected) -> String {
     format!("{cause:<34} {odds:>12} {probability:>18.3}  {}", causes(rival))
 }
 
-fn of_part(part: &Part) -> String {
+fn of_part(part: &Part, command: &Unit) -> String {
     let way = if part.ramp { "ramp" } else { "hold" };
     let separates = part.separates.map_or_else(String::new, |[one, other]| {
         format!("[{}] from [{}], {:.0} %", one + 1, other + 1, 100.0 * part.contribution)
     });
     let [from, to] = [part.from_s, part.to_s].map(number);
-    format!("{from:>10} {to:>10} {:>10}  {way}  {separates}", number(part.voltage_v))
+    format!("{from:>10} {to:>10} {:>10}  {way}  {separates}", number(part.voltage_v / command.si))
 }
 
-fn of_interval(it: &Sharper) -> String {
+fn of_interval(it: &Sharper, plan: &Plan) -> String {
     let name = format!("{} {}", it.cause, it.parameter);
-    let now = it.now.map_or_else(|| "-".to_owned(), number);
-    format!("{name:<38}  {now:<12}  {} {}", number(it.planned), it.unit)
+    // A reading in V is not converted: the answer does not tell it from a voltage.
+    let of_command = it.unit.strip_prefix('V').filter(|rest| plan.reading_unit != "V" && ["", "/s"].contains(rest));
+    let Unit { name: command, si } = &plan.command_unit;
+    let (unit, si) = of_command.map_or((it.unit.clone(), 1.0), |rest| (format!("{command}{rest}"), *si));
+    let now = it.now.map_or_else(|| "-".to_owned(), |now| number(now / si));
+    format!("{name:<38}  {now:<12}  {} {unit}", number(it.planned / si))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn only_commands_that_can_play_the_schedule_are_named() {
-        let plan = |low_v, high_v| Plan {
+    fn plan(low_v: f64, high_v: f64) -> Plan {
+        Plan {
             schedule: Some("my plan/schedule.csv".into()),
             decides: Vec::new(),
             probability: None,
@@ -162,8 +170,42 @@ mod tests {
             commands: Vec::new(),
             responses: Vec::new(),
             reading_unit: "V".into(),
+            command_unit: Unit::of_voltage("V"),
             remarks: Vec::new(),
+        }
+    }
+
+    /// A voltage in kV as such, and a command that is no voltage in its own unit.
+    #[test]
+    fn commands_are_in_the_unit_of_the_record() {
+        let part = Part { from_s: 0.0, to_s: 2.0, voltage_v: 4900.0, ramp: false, separates: None, contribution: 0.0 };
+        let width = Sharper {
+            cause: "hysteresis".into(),
+            parameter: "width_v".into(),
+            value: 200.0,
+            now: Some(100.0),
+            planned: 50.0,
+            unit: "V".into(),
         };
+        for (unit, [range, level, half]) in [
+            ("V", ["between 0 and 4900 V", "4900  hold", "50.00 V"]),
+            ("kV", ["between 0 and 4.900 kV", "4.900  hold", "0.05000 kV"]),
+            ("bar", ["between 0 and 4900 bar", "4900  hold", "50.00 bar"]),
+        ] {
+            let plan = Plan {
+                command_unit: Unit::of_voltage(unit),
+                parts: vec![part.clone()],
+                intervals: vec![width.clone()],
+                reading_unit: "mm".into(),
+                ..plan(0.0, 4900.0)
+            };
+            let said = text(&plan);
+            assert!([range, level, half, &format!("to {unit} ")].iter().all(|it| said.contains(it)), "{said}");
+        }
+    }
+
+    #[test]
+    fn only_commands_that_can_play_the_schedule_are_named() {
         let spring = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 4.0\n";
         let text = how_to_play(&plan(0.0, 700.0), spring);
         let simulated = "vsj stair --plant 'my plan/plant.toml' --input 'my plan/schedule.csv' --controller none\n";
