@@ -29,6 +29,8 @@ const THRESHOLD: f64 = 0.3;
 const RETURNS_PER_REPEAT: f64 = 0.25;
 /// Size of the changes after held readings, relative to that of the others, from which they catch up.
 const CATCHING_UP: f64 = 0.8;
+/// Largest ratio of a voltage's changes from row to row where it moves steadily.
+const STEADY: f64 = 3.0;
 /// Mean number of rows from one new reading to the next, above which a clock may set it: with less, some readings are lost.
 const QUICKEST_CLOCK: f64 = 1.5;
 /// Scatter of the numbers of rows from one new reading to the next, relative to their mean, below which a clock sets them.
@@ -144,7 +146,11 @@ fn repeated(record: &Record, rows: &[(usize, f64, f64)]) -> Option<(Reason, Vec<
     let held_rows = rows.len() - changing.len();
     let too_few = held_rows < (LEAST_HELD.get() * rows.len() as f64) as usize;
     let changes_after = |held: bool| changes_at_rest(record, rows, &changing, held);
-    if too_few || changing.len() < FEWEST_NEW || !is_held(&values, held_rows, equal, [true, false].map(changes_after)) {
+    let moving = || catching_up_in_movement(record, rows, &changing);
+    if too_few
+        || changing.len() < FEWEST_NEW
+        || !is_held(&values, held_rows, equal, [true, false].map(changes_after), moving())
+    {
         return None;
     }
     // A held reading may be the highest one, but a bound is reached again and again.
@@ -176,14 +182,33 @@ fn changes_at_rest(record: &Record, rows: &[(usize, f64, f64)], new: &[usize], h
     wanted.map(|pair| (rows[pair[1]].2 - rows[pair[0]].2).abs()).collect()
 }
 
+/// Returns the changes after held readings per row, relative to the mean of the changes of one row before and after, under a voltage that
+/// moves steadily: 1 where a reading was held, the inverse of the number of rows where a slow response was rounded.
+fn catching_up_in_movement(record: &Record, rows: &[(usize, f64, f64)], new: &[usize]) -> Vec<f64> {
+    let change = |from: usize, to: usize| (rows[to].2 - rows[from].2).abs();
+    let moves_steadily = |from: usize, to: usize| {
+        let moves = (rows[from].0..rows[to].0).map(|row| record.rows[row + 1].voltage_v - record.rows[row].voltage_v);
+        let [least, most] = range(&moves.collect::<Vec<_>>());
+        least * most > 0.0 && least.abs().max(most.abs()) < STEADY * least.abs().min(most.abs())
+    };
+    let is_held = |of: &&[usize]| of[1] - of[0] == 1 && of[2] - of[1] > 1 && of[3] - of[2] == 1;
+    let wanted = new.windows(4).filter(is_held).filter(|of| moves_steadily(of[0], of[3]));
+    let ratio = |of: &[usize]| {
+        let beside = 0.5 * (change(of[0], of[1]) + change(of[2], of[3]));
+        change(of[1], of[2]) / (beside * (of[2] - of[1]) as f64)
+    };
+    wanted.map(ratio).filter(|ratio| ratio.is_finite()).collect()
+}
+
 /// Returns true if readings, of which none repeats the one before, are new ones of a continuous sensor that were held in between. They
 /// are noise or changes of a least size, or those after held readings, the first of the given changes at rest, catch up: a rounded
-/// response repeats where it hardly changes, and then changes least.
+/// response repeats where it hardly changes, and then changes least. So do those of [`catching_up_in_movement`].
 fn is_held(
     new: &[f64],
     held_rows: usize,
     equal: impl Fn(f64, f64) -> bool,
     [after_held, others]: [Vec<f64>; 2],
+    mut in_movement: Vec<f64>,
 ) -> bool {
     let changes = changes(new);
     let [smallest, middle] = [changes[(SMALLEST * changes.len() as f64) as usize], changes[changes.len() / 2]];
@@ -195,7 +220,8 @@ fn is_held(
     distinct.dedup_by(|a, b| equal(*a, *b));
     let grid = QuantisationGrid::of(&distinct).map_or(0.0, |grid| grid.step);
     let [held, direct] = [&after_held, &others].map(|changes| median(&mut changes.clone()).unwrap_or(0.0));
-    let catches_up = after_held.len() >= FEWEST_NEW && held > CATCHING_UP * direct;
+    let catches_up = after_held.len() >= FEWEST_NEW && held > CATCHING_UP * direct
+        || in_movement.len() >= FEWEST_NEW && median(&mut in_movement).is_some_and(|middle| middle > CATCHING_UP);
     // A grid makes readings return nearly as often as repeat.
     let repeats = held_rows as f64 / new.len() as f64;
     part(returns) < MOST_RETURNS.get().min(RETURNS_PER_REPEAT * repeats)
@@ -262,9 +288,14 @@ mod tests {
 
     /// The same with another noise, in V.
     fn record_with(noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
+        driven(|row| 100.0 * (row / 200 % 4) as f64, noise_v, read)
+    }
+
+    /// The same under the voltage of each row.
+    fn driven(voltage_v: impl Fn(usize) -> f64, noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
         let (mut state, mut before, mut random) = (0.0, 0.0, 1u32);
         let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
-            let voltage_v = 100.0 * (row / 200 % 4) as f64;
+            let voltage_v = voltage_v(row);
             state += (voltage_v - state) / 30.0;
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             before = read(before, state + noise_v * noise, f64::from(random >> 8) / f64::from(1 << 24));
@@ -313,6 +344,20 @@ mod tests {
             assert_eq!(held(&slow).map(|held| held.reason), Some(Reason::SlowClock), "{noise_v}");
             for step in [0.01, 0.1, 0.5, 2.0] {
                 let rounded = record_with(noise_v, |_, new, _| (new / step).round() * step);
+                assert_eq!(held(&rounded), None, "{noise_v} {step}");
+            }
+        }
+    }
+
+    #[test]
+    fn readings_that_were_lost_in_a_steady_movement_are_held_and_rounded_ones_are_not() {
+        let triangle = |row: usize| 500.0 - (row as f64 % 1000.0 - 500.0).abs();
+        for noise_v in [0.0, 0.05, 0.2] {
+            let lost = driven(triangle, noise_v, |before, new, random| if random < 0.12 { before } else { new });
+            let lost = held(&lost).unwrap();
+            assert!(lost.reason == Reason::Lost && (lost.fraction - 0.12).abs() < 0.03, "{noise_v}: {lost:?}");
+            for step in [0.01, 0.5, 1.5, 3.0, 8.0] {
+                let rounded = driven(triangle, noise_v, |_, new, _| (new / step).round() * step);
                 assert_eq!(held(&rounded), None, "{noise_v} {step}");
             }
         }
