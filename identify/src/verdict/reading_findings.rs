@@ -11,7 +11,8 @@ use crate::stats::scale::root_mean_square;
 use crate::stats::thresholds::empirical::{FINEST_V, STEP_TO_REPORT};
 use crate::stats::thresholds::probability::Z;
 
-/// Smallest noise from row to row with which a step is compared, relative to the whole error.
+/// Smallest noise with which a step is compared, relative to the whole error. It is that from row to row, or what one row adds to the ones
+/// before: of autocorrelated noise the differences of neighbours show a part.
 const LEAST_STEP_PER_ERROR: f64 = 0.2;
 /// Half of the interval of a bound that readings show exactly, relative to it.
 const EXACT: f64 = 1e-6;
@@ -38,7 +39,7 @@ fn quantisation(data: &Data, observed: &Observed, fit: &Fit) -> Option<Finding> 
     let (raw, within) = (root_mean_square(&fit.residual), observed.rms(&fit.residual));
     let is_cut_off = observed.truncation_v != 0.0;
     // An error that nothing explains does not make coarse steps fine.
-    let noise_v = observed.scatter_v.max(LEAST_STEP_PER_ERROR * within);
+    let noise_v = observed.scatter_v.max(fit.noise.sigma).max(LEAST_STEP_PER_ERROR * within);
     let reported = (STEP_TO_REPORT.get() * within.min(noise_v)).max(2.0 * FINEST_V.get());
     if step <= reported && !is_cut_off {
         return None;
