@@ -1,4 +1,5 @@
-//! Every number that a decision of the diagnosis is compared with; algorithm sizes and numerical tolerances stay with their code.
+//! Limits of decisions of the search and of the verdict, in one place so that a command can vary them. Limits of a single check, algorithm
+//! sizes and numerical tolerances stay with their code.
 //!
 //! - [`probability`]: limits that follow from the probability of a false alarm.
 //! - [`empirical`]: limits that were set by counting right and wrong diagnoses. `cargo thresholds` counts again at half and twice
