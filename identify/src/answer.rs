@@ -182,6 +182,10 @@ pub struct Nominal {
     pub share: f64,
     /// Time constants, in s.
     pub tau_s: Vec<f64>,
+    /// Delay of the amplifier, in s.
+    pub delay_s: f64,
+    /// Frequencies of its oscillations, in Hz.
+    pub freq_hz: Vec<f64>,
 }
 
 /// Errors of a simulation.

@@ -193,6 +193,8 @@ class NominalPlant:
     zero: float
     share: float
     tau_s: List[float]
+    delay_s: float
+    freq_hz: List[float]
 
 
 @dataclass(frozen=True)

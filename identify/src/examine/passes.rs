@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use anyhow::Result;
 
 use simulation::bad_input;
-use simulation::plant_file::Reading;
+use simulation::plant_file::{PlantFile, Reading};
 use simulation::record::Record;
 
 use crate::answer::{Nominal, Report, SearchReport, Verdict};
@@ -252,8 +252,16 @@ fn under(
 /// The nominal spring for the report, called `plant`.
 fn nominal(plant: &str, base: &Base) -> Nominal {
     let Reading { gain, zero } = base.file().reading.unwrap_or_default();
-    let relaxation = &base.file().relaxation;
-    Nominal { plant: plant.to_owned(), gain, zero, share: relaxation.share, tau_s: relaxation.tau_s.clone() }
+    let PlantFile { relaxation, amplifier, modes, .. } = base.file();
+    Nominal {
+        plant: plant.to_owned(),
+        gain,
+        zero,
+        share: relaxation.share,
+        tau_s: relaxation.tau_s.clone(),
+        delay_s: amplifier.as_ref().and_then(|amplifier| amplifier.delay_s).unwrap_or(0.0),
+        freq_hz: modes.iter().map(|mode| mode.freq_hz).collect(),
+    }
 }
 
 /// Share of the work for the diagnosis under a simpler nominal spring.

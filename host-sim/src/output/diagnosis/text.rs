@@ -201,7 +201,13 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
         (1.0, [_]) => "no dynamics".to_owned(),
         (share, taus) => format!("time constant {}, instantaneous share {}", taus.join(" and "), significant(share, 3)),
     };
-    format!("Nominal spring: {}, {dynamics}{reading}.", nominal.plant)
+    let delay = match nominal.delay_s {
+        0.0 => String::new(),
+        delay_s => format!(", delay {}", scales.four_digits(Dimension::Time, delay_s)),
+    };
+    let oscillation = |&freq_hz: &f64| format!(", oscillation {}", scales.four_digits(Dimension::Frequency, freq_hz));
+    let oscillations: String = nominal.freq_hz.iter().map(oscillation).collect();
+    format!("Nominal spring: {}, {dynamics}{delay}{oscillations}{reading}.", nominal.plant)
 }
 
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
@@ -529,10 +535,14 @@ mod tests {
 
     #[test]
     fn a_spring_without_dynamics_has_no_time_constant() {
-        let spring = |share| Nominal { plant: "identify".into(), gain: 1.0, zero: 0.0, share, tau_s: vec![4.0] };
+        let spring =
+            |share| Nominal { plant: "identify".into(), gain: 1.0, share, tau_s: vec![4.0], ..Nominal::default() };
         assert_eq!(nominal(&spring(1.0), &Scales::default()), "Nominal spring: identify, no dynamics.");
         let lag = "Nominal spring: identify, time constant 4.000 s, instantaneous share 0.500.";
         assert_eq!(nominal(&spring(0.5), &Scales::default()), lag);
+        let more = Nominal { delay_s: 6.0, freq_hz: vec![2.5], ..spring(0.5) };
+        let said = format!("{}, delay 6.000 s, oscillation 2.500 Hz.", lag.trim_end_matches('.'));
+        assert_eq!(nominal(&more, &Scales::default()), said);
     }
 
     #[test]
