@@ -2,6 +2,7 @@
 //! series that only a linear model knows, and of a change that ends.
 
 use identify::{Effort, Options, Report, Stop, Verdict, diagnose};
+use simulation::plant_file;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
@@ -54,6 +55,36 @@ fn a_law_that_no_cause_describes_is_not_explained() {
     ));
     assert_eq!(found.verdict, Verdict::Unexplained, "{found:?}");
     assert!(found.findings.iter().all(|finding| finding.probability <= 0.9), "{:?}", found.findings);
+}
+
+/// A controller brings the noise of the readings into the command, on which the residual of the right simulation then depends. The same
+/// disturbance under a schedule leaves nothing but noise.
+#[test]
+fn a_right_simulation_in_a_control_loop_is_not_wrong() {
+    let spring = "schema = 1\n[relaxation]\nshare = 0.0\ntau_s = 5.5\n";
+    let options = Options::default().judging_file("loop", plant_file::parse("loop", spring).unwrap()).unwrap();
+    for (in_feedback, expected) in [(true, Verdict::Insufficient), (false, Verdict::Consistent)] {
+        let (mut state, mut slow, mut sum, mut noise) = (0.0, 0.0, 0.0, noise(11));
+        let row = |row: usize| {
+            slow = 0.95 * slow + 0.5 * noise();
+            let target = [100.0, 250.0, 50.0, 300.0, 150.0, 200.0][row / 200 % 6];
+            let error = target - (state + slow);
+            let controlled: f64 = 5.0 * error + sum;
+            sum += 0.1 * error;
+            let voltage_v = match (row < 50, in_feedback) {
+                (true, _) => 0.0,
+                (false, true) => controlled.clamp(0.0, 500.0),
+                (false, false) => target,
+            };
+            let measured = Some(state + slow);
+            state = lag(voltage_v, state, 5.5);
+            Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured }
+        };
+        let record = Record { name: "record".into(), rows: (0..ROWS).map(row).collect() };
+        let found = diagnose(&record, &options).unwrap();
+        assert_eq!(found.verdict, expected, "{found:?}");
+        assert_eq!(found.leftover.is_some_and(|left| left.contains("made in feedback")), in_feedback);
+    }
 }
 
 /// A search that was stopped has nothing to say on what it has not tried.

@@ -88,7 +88,7 @@ fn a_cause_in_one_record_only_is_a_fault_of_that_record() {
         .flat_map(|of| of.findings.iter().map(|finding| (of.name.as_str(), finding.cause)))
         .collect();
     assert_eq!(faults, [("second", "sensor-saturation")], "{report:#?}");
-    assert_eq!(report.verdict, Verdict::Explained);
+    assert_eq!((report.verdict, &report.next_experiment), (Verdict::Explained, &None));
 }
 
 /// A shift of the readings from the middle of one record on, in V, has a part in its zero, and biases what all records share.
