@@ -123,6 +123,8 @@ impl Lanes {
         let (is_prepared, wait_prepared) = mpsc::channel();
         // Where a lane ends without its message, it has failed.
         let host = move || {
+            // Dropped where the lane ends, which the other one waits for.
+            let has_built = has_built;
             each(slice::from_ref(&self.build), Step::run)?;
             let _ = has_built.send(());
             each(self.host, Step::run)?;
@@ -172,5 +174,24 @@ impl Progress {
 
     pub(crate) fn end(self) {
         eprintln!("all {} steps passed in {} s", self.total, self.start.elapsed().as_secs());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    const FAILS: Step = Step::new("build", &["no-such-command"]);
+
+    #[test]
+    fn a_build_that_fails_ends_both_lanes() {
+        let (ended, wait) = mpsc::channel();
+        thread::spawn(move || {
+            let lanes = Lanes { build: FAILS, host: &[], beside: &[], built: &[FAILS] };
+            ended.send(lanes.run(&Progress::of(lanes.count())).is_err())
+        });
+        assert_eq!(wait.recv_timeout(Duration::from_secs(60)), Ok(true));
     }
 }
