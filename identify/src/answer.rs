@@ -3,7 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use crate::dimension::Dimension;
-use crate::hypotheses::{Experiment, Rival};
+use crate::hypotheses::{Experiment, Rival, are_same};
 use crate::stats::thresholds::probability::RIVAL_ODDS;
 
 /// Version of the JSON format.
@@ -71,10 +71,8 @@ impl Report {
     /// Returns true if the readings themselves reject a set of causes, which is then an alternative only because a law that no cause
     /// describes may be in place of a finding that it lacks; false for a set that was not fitted.
     pub fn rejects(&self, set: &[&str]) -> bool {
-        let is_it = |rival: &&Rival| {
-            rival.causes.len() == set.len() && rival.causes.iter().all(|cause| set.contains(&cause.as_str()))
-        };
-        self.rivals.iter().find(is_it).is_some_and(|rival| rival.nats < -RIVAL_ODDS)
+        let fitted = self.rivals.iter().find(|rival| are_same(set, &rival.causes));
+        fitted.is_some_and(|rival| rival.nats < -RIVAL_ODDS)
     }
 }
 

@@ -24,6 +24,12 @@ pub struct Rival {
     pub covariance: Vec<Vec<f64>>,
 }
 
+/// Returns true if two sets of causes are the same, in any order.
+pub(crate) fn are_same(one: &[impl AsRef<str>], other: &[impl AsRef<str>]) -> bool {
+    let has = |cause: &str| one.iter().any(|own| own.as_ref() == cause);
+    one.len() == other.len() && other.iter().all(|cause| has(cause.as_ref()))
+}
+
 /// A parameter with its 95 % interval; an end that the record does not determine is `None`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {

@@ -11,7 +11,7 @@ pub enum Unidentifiable {
     DeadSensor(String),
     /// The readings are not those of a spring but noise; the sentence says what the voltage does.
     Noise(String),
-    /// The command follows the readings, so that an error of the simulation and noise in the command are not told apart.
+    /// The command follows the readings, so that an error of the simulation cannot be distinguished from noise in the command.
     Feedback,
 }
 

@@ -7,7 +7,7 @@ use simulation::units::Unit;
 use crate::dimension::Dimension;
 use crate::effects::model::Model;
 use crate::fit::engine::Engine;
-use crate::hypotheses::Rival;
+use crate::hypotheses::{Rival, are_same};
 use crate::noise::Noise;
 use crate::plan::answer::{Command, Part, Plan, Response, Separation};
 use crate::plan::candidate::{Candidate, Commands};
@@ -81,7 +81,7 @@ fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> 
     let undecided = |rival: &Rival| {
         rival.nats == 0.0
             || basis.verdict == UNEXPLAINED
-            || basis.alternatives.iter().any(|set| same(set, &rival.causes))
+            || basis.alternatives.iter().any(|set| are_same(set, &rival.causes))
     };
     let near = |rival: &Rival| basis.verdict == "ambiguous" && rival.nats > -TIMES_RIVAL_ODDS * RIVAL_ODDS;
     for rival in weighed(basis).iter().filter(|rival| undecided(rival) || near(rival)) {
@@ -108,10 +108,6 @@ fn design(basis: &Basis, request: &Request, name: &str, random: &mut Random) -> 
         design.bends.push(hypothesis.bends(&data, design.base.relaxation.tau_s));
     }
     Ok((design, remarks))
-}
-
-fn same(one: &[String], other: &[String]) -> bool {
-    one.len() == other.len() && other.iter().all(|cause| one.contains(cause))
 }
 
 /// Returns a set of causes in words.

@@ -7,8 +7,8 @@
 //! v(t) = u(t) - prediction from y and u before t          w(t) = u(t) - prediction from u before t
 //! ```
 //!
-//! A command that follows the last reading makes `w(t + 1)` follow `e(t)`, a later one a `w` after that. One that follows the reading of its own row makes `v(t)` follow
-//! `e(t)` against the sign of the gain; with its sign an instantaneous response does. (Söderström and Ljung, *Automatica* 13, 1977, on
+//! A command that follows the last reading makes `w(t + 1)` follow `e(t)`, a later one a `w` after that. One that follows the reading of
+//! its own row makes `v(t)` follow `e(t)` against the sign of the gain; with its sign an instantaneous response does. (Söderström and Ljung, *Automatica* 13, 1977, on
 //! detecting feedback.)
 
 use nalgebra::{DMatrix, DVector};
@@ -17,8 +17,9 @@ use crate::stats::rank::rank_correlation;
 
 /// Rows before a row from which it is predicted.
 const ORDER: usize = 4;
-/// Smallest correlation of a feedback, and smallest number of rows in which it is looked for; by chance it is reached in none of 10^6.
+/// Smallest rank correlation that shows a feedback: in the fewest rows chance reaches it once in a million.
 const LEAST_CORRELATION: f64 = 0.3;
+/// Smallest number of rows in which a feedback is looked for.
 const FEWEST_ROWS: usize = 300;
 /// Largest number of rows after which a command follows a reading.
 const LATEST: usize = 3;
@@ -41,24 +42,28 @@ pub(crate) fn is_in_feedback(command: &[f64], reading: &[f64]) -> bool {
     if (moving as f64) < LEAST_MOVING * rows as f64 {
         return false;
     }
-    let (new, own, both) = (unpredicted(y, &[y, u]), unpredicted(u, &[u]), unpredicted(u, &[y, u]));
+    let [new, both] = unpredicted([y, u], &[y, u]);
+    let [own] = unpredicted([u], &[u]);
     let correlation = |one: &[f64], other: &[f64]| rank_correlation(one, other) / (one.len() as f64 - 1.0).sqrt();
     let follows = |late: usize| correlation(&new[..new.len() - late], &own[late..]).abs() > LEAST_CORRELATION;
     (1..=LATEST).any(follows) || correlation(&new, &both) < -LEAST_CORRELATION
 }
 
-/// What the rows before each row, of all signals `from`, do not predict of `values` by linear regression.
-fn unpredicted(values: &[f64], from: &[&[f64]]) -> Vec<f64> {
-    let rows = values.len() - ORDER;
+/// What the rows before each row, of all signals `from`, do not predict of each of some signals of the same length by linear regression.
+fn unpredicted<const N: usize>(signals: [&[f64]; N], from: &[&[f64]]) -> [Vec<f64>; N] {
+    let rows = from[0].len() - ORDER;
     let columns = 1 + ORDER * from.len();
     let before = DMatrix::from_fn(rows, columns, |row, column| match column.checked_sub(1) {
         None => 1.0,
         Some(column) => from[column / ORDER][row + ORDER - 1 - column % ORDER],
     });
-    let now = DVector::from_column_slice(&values[ORDER..]);
-    // Signals that are constant, or predict each other, need not all be used.
-    let predicted = before.tr_mul(&before).svd(true, true).solve(&before.tr_mul(&now), 1e-12 * before.norm_squared());
-    predicted.map_or_else(|_| values[ORDER..].to_vec(), |part| (now - before * part).as_slice().to_vec())
+    let normal = before.tr_mul(&before).svd(true, true);
+    signals.map(|signal| {
+        let now = DVector::from_column_slice(&signal[ORDER..]);
+        // Signals that are constant, or predict each other, need not all be used.
+        let part = normal.solve(&before.tr_mul(&now), 1e-12 * before.norm_squared());
+        part.map_or_else(|_| signal[ORDER..].to_vec(), |part| (now - &before * part).as_slice().to_vec())
+    })
 }
 
 #[cfg(test)]

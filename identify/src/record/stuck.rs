@@ -98,8 +98,10 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
     let is_bound = |run: &Range<usize>| {
         special.iter().any(|(value, begins)| *begins >= FEWEST_TIES.count() && readings.equal(run.start, *value))
     };
-    let (jumped, others): (Vec<_>, Vec<_>) =
-        runs.into_iter().skip(1).partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
+    let (jumped, others): (Vec<_>, Vec<_>) = runs
+        .into_iter()
+        .filter(|run| run.start > 0)
+        .partition(|run| run.len() >= FEWEST_TIES.count() && readings.jump(run));
     // Of a contact that is loose, so are shorter losses and those next to a step of the voltage.
     let is_same = |run: &Range<usize>| jumped.iter().any(|of| readings.equal(run.start, readings.value[of.start]));
     let (lost, others): (Vec<_>, Vec<_>) =
@@ -140,13 +142,12 @@ impl Readings {
         let largest = changes.iter().copied().fold(0.0, f64::max);
         let smallest = changes.iter().copied().filter(|change| *change > rounding).fold(f64::INFINITY, f64::min);
         let typical = median(&mut changes)?;
-        let [low, high] = range(&voltage);
         let rests = self::runs(voltage.len(), |row| voltage[row] == voltage[row - 1]);
         let ends = rests.iter().filter(|rest| rest.len() >= REST).map(|rest| free[rest.end - 1]);
         let (noisy, quiet): (Vec<bool>, Vec<bool>) = ends.partition(|free| *free);
         let noisy_rests = noisy.len() >= FEWEST_RESTS && noisy.len() > quiet.len();
         Some(Self {
-            change_v: CHANGE * (high - low),
+            change_v: smallest_change(&voltage),
             value,
             voltage,
             rounding,
@@ -188,9 +189,7 @@ impl Readings {
 
     /// True if the voltage rests in some rows, of those that exist.
     fn rests(&self, rows: Range<usize>) -> bool {
-        let within = &self.voltage[rows.start..rows.end.min(self.voltage.len())];
-        let [low, high] = range(within);
-        high - low <= self.change_v
+        rests(&self.voltage, self.change_v, rows)
     }
 
     /// True if noise shows: readings turn back under a voltage that rests, or often if it never does.
@@ -321,6 +320,18 @@ pub(super) fn range(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
 }
 
+/// Returns the smallest change of a voltage that counts, in V.
+fn smallest_change(voltage: &[f64]) -> f64 {
+    let [low, high] = range(voltage);
+    CHANGE * (high - low)
+}
+
+/// True if a voltage changes by no more than `change_v` in some rows, of those that exist.
+fn rests(voltage: &[f64], change_v: f64, rows: Range<usize>) -> bool {
+    let [low, high] = range(&voltage[rows.start..rows.end.min(voltage.len())]);
+    high - low <= change_v
+}
+
 /// Returns the ranges of rows that `continues` says to belong to the row before.
 fn runs(rows: usize, continues: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let starts: Vec<usize> = (0..rows).filter(|&row| row == 0 || !continues(row)).collect();
@@ -333,11 +344,8 @@ fn runs(rows: usize, continues: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
 /// lost for a few rows. The code of single failed readings makes outliers.
 fn dropouts(value: &[f64], voltage: &[f64], runs: &[Range<usize>], rounding: f64) -> Vec<Range<usize>> {
     let [low, high] = range(value);
-    let [least, most] = range(voltage);
-    let rests = |run: &&Range<usize>| {
-        let [low, high] = range(&voltage[run.start.saturating_sub(MARGIN)..(run.end + MARGIN).min(value.len())]);
-        high - low <= CHANGE * (most - least)
-    };
+    let change_v = smallest_change(voltage);
+    let rests = |run: &&Range<usize>| rests(voltage, change_v, run.start.saturating_sub(MARGIN)..run.end + MARGIN);
     let change = |row: &usize| (value[*row] - value[row - 1]).abs();
     let at = |extreme: f64| -> Vec<Range<usize>> {
         runs.iter().filter(|run| (value[run.start] - extreme).abs() <= rounding).cloned().collect()

@@ -8,7 +8,7 @@ use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::{Engine, Fit};
 use crate::fit::interval;
-use crate::hypotheses::{Coordinates, Experiment, FirstSpring, FittedBlock, FittedNoise, Interval, Rival};
+use crate::hypotheses::{Coordinates, Experiment, FirstSpring, FittedBlock, FittedNoise, Interval, Rival, are_same};
 use crate::record::data::Data;
 use crate::search::effects;
 use crate::stats::thresholds::probability::RIVAL_ODDS;
@@ -29,16 +29,17 @@ pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit
     }
     let best = &diagnosis.extended;
     let names = |model: &Model| effects(model).iter().map(|&effect| EFFECTS[effect].cause()).collect::<Vec<_>>();
-    let named = |model: &Model| diagnosis.report.alternatives.iter().any(|set| same(set, &names(model)));
+    let named = |model: &Model| diagnosis.report.alternatives.iter().any(|set| are_same(set, &names(model)));
     let unexplained = diagnosis.unexplained_v > 0.0;
     let near = |score: f64| unexplained || score > diagnosis.score - TIMES_RIVAL_ODDS * RIVAL_ODDS;
     // The sets of the suspects, and those without a finding, in which a verdict that becomes `unexplained` later makes a suspect.
     let is_suspect = |causes: &[&str]| {
         let set = |suspect: &Suspect| suspect.with.iter().copied().chain([suspect.cause]).collect::<Vec<_>>();
-        diagnosis.report.suspects.iter().any(|suspect| same(causes, &set(suspect)))
+        diagnosis.report.suspects.iter().any(|suspect| are_same(causes, &set(suspect)))
     };
-    let without_finding =
-        |causes: &[&str]| diagnosis.ranking.iter().any(|it| !it.best_without.is_empty() && same(causes, &it.causes));
+    let without_finding = |causes: &[&str]| {
+        diagnosis.ranking.iter().any(|it| !it.best_without.is_empty() && are_same(causes, &it.causes))
+    };
     let in_doubt = |model: &Model| {
         let causes = names(model);
         diagnosis.report.verdict != Verdict::Ambiguous && (is_suspect(&causes) || without_finding(&causes))
@@ -54,7 +55,7 @@ pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit
         rivals.push(rival(&mut engine, &other.fit, (other.score - diagnosis.score).min(0.0)));
     }
     for set in &diagnosis.report.alternatives {
-        if !rivals.iter().any(|rival| same(set, &rival.causes))
+        if !rivals.iter().any(|rival| are_same(set, &rival.causes))
             && let Some(fit) = exchanged(&mut engine, best, set)
         {
             let nats = (fit.log_likelihood - best.log_likelihood).min(0.0);
@@ -62,11 +63,6 @@ pub(crate) fn hypotheses(diagnosis: &Diagnosis, records: &[Record], reading_unit
         }
     }
     (rivals, experiment)
-}
-
-/// Returns true if two sets of causes are the same, in any order.
-fn same(one: &[&str], other: &[impl AsRef<str>]) -> bool {
-    one.len() == other.len() && other.iter().all(|cause| one.contains(&cause.as_ref()))
 }
 
 /// Fits a set of causes that the search did not evaluate: the blocks of the best fit that it shares, and the likeliest form of

@@ -220,6 +220,9 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });
     let (one, rows) = (causes.len() == 1, report.rows);
+    // What is left of the readings, not what they lack, is why the record cannot decide.
+    let is_undecided =
+        report.verdict == Verdict::Insufficient && report.leftover.is_some() && report.would_show.is_none();
     let unfinished = unfinished(report).into_iter();
     let mut sentences: Vec<String> = unfinished.chain(parts_to_take_out(report, scales)).collect();
     sentences.push(match report.verdict {
@@ -238,7 +241,7 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
                 margins.map_or_else(String::new, |off| format!(", in which {off} would have been detected"))
             )
         }
-        Verdict::Insufficient if report.leftover.is_some() && report.would_show.is_none() => {
+        Verdict::Insufficient if is_undecided => {
             format!("{name} cannot decide whether the simulation is wrong.")
         }
         Verdict::Insufficient => format!(
@@ -339,8 +342,11 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
         ));
     }
     if let Some(leftover) = &report.leftover {
-        let decides = report.verdict == Verdict::Unexplained || report.verdict == Verdict::Insufficient;
-        let small = if decides { "" } else { "Too small to change this verdict: " };
+        let small = if is_undecided || report.verdict == Verdict::Unexplained {
+            ""
+        } else {
+            "Too small to change this verdict: "
+        };
         sentences.push(format!("{small}{leftover}."));
     }
     match (another_spring(report), &report.next_experiment) {
