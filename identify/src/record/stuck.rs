@@ -11,8 +11,9 @@
 //!
 //! Of a sensor that sticks once, the other long runs are faults as well. So is one if the readings jump to one value and back from it by
 //! more than they ever change, while the voltage rests: a loose contact, of which every other jump to that value and back is a fault. At
-//! an end of the range, at a bound or at 0, only such jumps prove a fault, or a sensor that sticks elsewhere: a bound is kept as long as
-//! the response is beyond it, and an outlier or a shift may end that.
+//! an end of the range, at a bound or at 0, only such jumps prove a fault, or a sensor that sticks elsewhere, or a single run that begins
+//! like any movement and ends with a jump of more than the readings ever change, while the voltage rests: a bound is kept as long as the
+//! response is beyond it, and an outlier or a shift may end that.
 
 use std::ops::Range;
 
@@ -115,7 +116,10 @@ pub(super) fn stuck(record: &Record, rows: &[(usize, f64, f64)]) -> Option<Vec<u
             || readings.is_among_noise(run, shortest) || readings.catches_up_at_rest(run) || readings.stays_behind(run);
         have_noise && by_noise() || readings.stops_in_a_movement(run)
     };
-    let sticks = long.iter().any(|run| !is_special(run) && is_proved(run));
+    let is_proved = |run: &Range<usize>| {
+        if is_special(run) { have_noise && readings.leaves_with_a_jump(run) } else { is_proved(run) }
+    };
+    let sticks = long.iter().any(is_proved);
     let repeated = long.into_iter().filter(|_| sticks).map(|run| run.start + 1..run.end);
     let faulty: Vec<Range<usize>> =
         dropped.into_iter().chain(jumped.iter().cloned()).chain(lost).chain(repeated).collect();
@@ -247,9 +251,32 @@ impl Readings {
     /// True if the run ends with a jump of more than `least`, and not with an outlier.
     fn catches_up(&self, run: &Range<usize>, least: f64) -> bool {
         let after = run.end + 1..(run.end + 1 + AFTER).min(self.value.len());
+        let away = self.typical.min(least);
         run.end < self.value.len()
             && self.change(run.end).abs() > least
-            && after.into_iter().all(|row| (self.value[row] - self.value[run.start]).abs() > self.typical)
+            && after.into_iter().all(|row| (self.value[row] - self.value[run.start]).abs() > away)
+    }
+
+    /// True if the readings come to the run by no more than they change elsewhere, and jump from it by more, while the voltage rests: those
+    /// of a bound leave it by less than the response moves, and a shift that takes them to a bound makes a jump there as well.
+    fn leaves_with_a_jump(&self, run: &Range<usize>) -> bool {
+        run.start > 0
+            && self.change(run.start).abs() <= self.largest
+            && self.catches_up(run, self.largest)
+            && self.rests(run.end - MARGIN..run.end + MARGIN + 1)
+    }
+
+    /// Median change from row to row among the free readings beside the run, and at least what a coarse reading changes by; the median of
+    /// all if there are too few.
+    fn typical_beside(&self, run: &Range<usize>) -> f64 {
+        let beside = run.len().max(BESIDE);
+        let before = run.start.saturating_sub(beside).max(1)..run.start;
+        let after = (run.end + 2)..(run.end + 2 + beside).min(self.value.len());
+        let free = |row: &usize| self.free[row - 1] && self.free[*row];
+        let mut changes: Vec<f64> = before.chain(after).filter(free).map(|row| self.change(row).abs()).collect();
+        let least = LEAST_RANGE * self.smallest;
+        let typical = if changes.len() < BESIDE { None } else { median(&mut changes) };
+        typical.map_or(self.typical, |typical| typical.max(least))
     }
 
     /// True if the readings move right before the run.
@@ -261,7 +288,7 @@ impl Readings {
     /// the voltage rests.
     fn catches_up_at_rest(&self, run: &Range<usize>) -> bool {
         let half = run.start + run.len() / 2;
-        self.catches_up(run, MOVES * self.typical)
+        self.catches_up(run, MOVES * self.typical.min(self.typical_beside(run)))
             && (self.rests(half..run.end + 1) || self.stops(run) && self.rests(run.end - MARGIN..run.end + MARGIN + 1))
     }
 
@@ -476,6 +503,35 @@ mod tests {
         let runs = [[300, 330], [560, 600]];
         let stuck = stuck_in(&held_in(record, &runs, None)).unwrap();
         assert_eq!(stuck.rows, rows_of(&runs));
+    }
+
+    /// A slow triangle of the voltage, between fast ones; noise of 1 V.
+    fn triangles() -> Record {
+        let mut state = 0.0;
+        let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
+            let (at, period) = if (600..1400).contains(&row) { (row - 600, 800) } else { (row % 100, 100) };
+            let voltage_v = at.min(period - at) as f64 * 200.0 / period as f64;
+            state += (voltage_v - state) / 3.0;
+            Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(state + noise) }
+        });
+        Record { name: String::new(), rows: rows.collect() }
+    }
+
+    #[test]
+    fn a_short_stop_in_a_slow_movement_is_compared_with_the_readings_beside_it() {
+        assert_eq!(stuck_in(&triangles()), None);
+        for runs in [[[700, 724]], [[1103, 1127]]] {
+            assert_eq!(stuck_in(&held_in(triangles(), &runs, None)).map(|stuck| stuck.rows), Some(rows_of(&runs)));
+        }
+    }
+
+    #[test]
+    fn a_single_run_at_the_highest_reading_that_ends_with_a_jump_is_no_bound() {
+        let record = triangles();
+        let by_reading = |a: &&Row, b: &&Row| a.measured.partial_cmp(&b.measured).unwrap();
+        let highest = record.rows.iter().max_by(by_reading).unwrap().line;
+        let runs = [[highest + 1, highest + 41]];
+        assert_eq!(stuck_in(&held_in(record, &runs, None)).map(|stuck| stuck.rows), Some(rows_of(&runs)));
     }
 
     /// Steps of 12 rows that never let a lightly damped spring rest, and one long rest, read in steps of 0.5 V; with noise of the readings
