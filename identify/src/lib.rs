@@ -83,6 +83,6 @@ pub use answer::{Margins, Report, Verdict};
 pub use examine::{Options, diagnose, examine, examine_several};
 pub use fit::budget::Effort;
 pub use fit::stop::Stop;
-pub use nominal::{Identified, identify};
+pub use nominal::{Identified, identify, identify_with_order};
 pub use record::input::Input;
 pub use verdict::diagnosis::Diagnosis;

@@ -85,6 +85,34 @@ fn a_force_in_newtons_is_identified() {
 }
 
 #[test]
+fn order_of_the_model_can_be_given() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("force.csv"), record(7.0)).unwrap();
+    let steps: String = (0..40).map(|row| format!("{row},{},{}\n", row / 5, row / 5 + row % 2)).collect();
+    fs::write(folder.path().join("short.csv"), format!("time_s,voltage_v,force\n{steps}")).unwrap();
+    let of =
+        |order: &str| json(folder.path(), &["identify", "force.csv", "--column", "force", "--order", order, "--json"]);
+    let chosen = json(folder.path(), &["identify", "force.csv", "--column", "force", "--json"]);
+    let (one, two) = (of("1"), of("2"));
+    assert_eq!(one["nominal"], chosen["nominal"]);
+    assert_eq!(one["remarks"], chosen["remarks"]);
+    assert_eq!((&two["order"], &two["linear"]), (&Value::from(2), &chosen["linear"]));
+    let poles = two["nominal"]["tau_s"].as_array().unwrap().len() + 2 * two["oscillation"].as_array().unwrap().len();
+    assert_eq!(poles, 2, "{two}");
+    assert_eq!(two["held_out_rmse"], two["linear"][1]["held_out_rmse"]);
+    assert_eq!(two["remarks"][0], "Order 2 was asked for; the held-out errors are in favour of order 1.");
+    for (file, order, expected) in [
+        ("force.csv", "0", "order 0: expected 1 to 4\n"),
+        ("force.csv", "5", "order 5: expected 1 to 4\n"),
+        ("short.csv", "4", "order 4: expected 1 to 3; a model of order 4 is not tried with fewer than 45 readings\n"),
+    ] {
+        let refused = run(folder.path(), &["identify", file, "--column", "force", "--order", order]);
+        assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+        assert!(text(&refused.stderr).ends_with(expected), "{}", text(&refused.stderr));
+    }
+}
+
+#[test]
 fn two_records_of_one_spring_have_their_own_zeros() {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join("a.csv"), record(7.0)).unwrap();

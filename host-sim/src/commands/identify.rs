@@ -7,7 +7,7 @@ use clap::Args;
 use host_sim::output::files::{Files, PLANT_FILE};
 use host_sim::output::identify::{self as output, Origin};
 use host_sim::output::terminal::{json, print, quoted, wrote};
-use identify::{Identified, Input, identify};
+use identify::{Identified, Input, identify, identify_with_order};
 use model::Amplifier;
 use simulation::bad_input;
 use simulation::plant_file;
@@ -32,6 +32,7 @@ Examples:
   vsj identify data/sample_hysteresis.csv          a table and remarks
   vsj identify a.csv b.csv                         two records of one spring
   vsj identify hv.csv --time t_ms:ms --voltage u_kV:kV --reading x_mm:mm
+  vsj identify record.csv --order 1                with one time constant
   vsj identify record.csv --out out/spring         with a page and plant.toml
   vsj diagnose record.csv --plant out/spring/plant.toml
   vsj bound --plant out/spring/plant.toml --identified out/spring/identify.json
@@ -39,6 +40,10 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     record: RecordArguments,
+    /// Order of the model, its number of poles: 1 to 4, as far as the readings allow; default: the smallest that no larger one beats.
+    /// The voltage drives all poles of an order that is given
+    #[arg(long, value_name = "N")]
+    order: Option<usize>,
     /// Write report.html, identify.json, the plots and the spring (plant.toml) to this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -56,7 +61,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let units = measured.first().map(|measured| measured.units.clone()).unwrap_or_default();
     let records: Vec<Record> = measured.into_iter().map(|measured| measured.record).collect();
     let files = arguments.out.as_deref().map(Files::new).transpose()?;
-    let mut identified = identify(&records, input, &units)?;
+    let mut identified = match arguments.order {
+        Some(order) => identify_with_order(&records, order, input, &units)?,
+        None => identify(&records, input, &units)?,
+    };
     if let Some(folder) = &arguments.out {
         identified.report.model = Some(folder.join(PLANT_FILE).display().to_string());
         identified.report.bound_command = bound_command(folder, &identified)?;

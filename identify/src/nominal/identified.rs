@@ -64,7 +64,7 @@ pub(super) fn described(records: &[Record], models: &Models, voltage: VoltageRan
 
 /// Describes the model of one order.
 fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageRange, units: &Units) -> Identified {
-    let Models { law, problem, fits, .. } = models;
+    let Models { law, problem, fits, in_place_of, .. } = models;
     let Model { fit, held_out, last_part } = &fits[order];
     let rows = problem.rows();
     let driven: usize = fit.poles.driven().map(|(_, section)| section.order()).sum();
@@ -139,7 +139,7 @@ fn of_order(records: &[Record], models: &Models, order: usize, voltage: VoltageR
         model: None,
         bound_command: None,
     };
-    report.remarks = remarks::remarks(&report, problem, fit, units);
+    report.remarks = remarks::remarks(&report, *in_place_of, problem, fit, units);
     let doubts = remarks::doubts(&report, problem, fit, units);
     let course = |(record, (&first, series)): (&Record, (&usize, &Series))| {
         let rows = || record.rows.iter().filter_map(|row| Some((row, row.measured?)));

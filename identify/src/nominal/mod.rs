@@ -29,7 +29,7 @@ use simulation::bad_input;
 use simulation::record::Record;
 use simulation::units::Units;
 
-use crate::linear::{Problem, Series, best_up_to};
+use crate::linear::{LARGEST_ORDER, Problem, Series, best_up_to, fewest_readings};
 use crate::nominal::identified::described;
 use crate::nominal::models::Models;
 use crate::nominal::plant::VoltageRange;
@@ -52,6 +52,31 @@ const MOST_SEARCHES: usize = 3;
 /// # Errors
 /// [`simulation::bad_input::BadInput`] for a record with too few readings, or whose voltage or reading never changes.
 pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Identified> {
+    identify_asked(records, Asked { input, units, order: None })
+}
+
+/// Identifies the spring as [`identify()`] does, but with so many poles, all of which the voltage drives.
+///
+/// # Errors
+/// Those of [`identify()`], and [`simulation::bad_input::BadInput`] for an order that is not searched, or not with so few readings.
+pub fn identify_with_order(records: &[Record], order: usize, input: Input, units: &Units) -> Result<Identified> {
+    if !(1..=LARGEST_ORDER).contains(&order) {
+        bad_input!("order {order}: expected 1 to {LARGEST_ORDER}");
+    }
+    identify_asked(records, Asked { input, units, order: Some(order) })
+}
+
+/// What is asked of an identification, besides the records.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    input: Input,
+    units: &'a Units,
+    /// The number of poles, if it is not to be chosen.
+    order: Option<usize>,
+}
+
+fn identify_asked(records: &[Record], asked: Asked) -> Result<Identified> {
+    let units = asked.units;
     if records.is_empty() {
         bad_input!("no record; expected at least one");
     }
@@ -63,16 +88,24 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     let mut left_out = Vec::new();
     let far = kept.iter().map(far_readings::at_start).collect();
     leave_out(&mut kept, far, &mut left_out);
-    let (mut identified, mut models) = of_all(&kept, &[], input, units);
+    let (mut identified, mut models) = of_all(&kept, &[], asked);
     for _ in 1..MOST_SEARCHES {
         let delay = identified.report.nominal.delay_s.value;
         let far = identified.records.iter().map(|course| far_readings::of_errors(course, delay)).collect();
         if !leave_out(&mut kept, far, &mut left_out) {
             break;
         }
-        (identified, models) = of_all(&kept, &[], input, units);
+        (identified, models) = of_all(&kept, &[], asked);
     }
-    let mut identified = with_zero_shifts(&kept, identified, models, input, units);
+    if let Some(order) = asked.order.filter(|order| *order >= models.fits.len()) {
+        let (largest, fewest) = (models.fits.len() - 1, fewest_readings(&models.problem, models.fits.len()));
+        let range = if largest == 1 { "1".to_owned() } else { format!("1 to {largest}") };
+        bad_input!(
+            "order {order}: expected {range}; a model of order {} is not tried with fewer than {fewest} readings",
+            largest + 1
+        );
+    }
+    let mut identified = with_zero_shifts(&kept, identified, models, asked);
     if !left_out.is_empty() {
         left_out.sort_by(|a, b| a.record.cmp(&b.record).then(a.time_s.total_cmp(&b.time_s)));
         identified.linear = None;
@@ -101,13 +134,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
 }
 
 /// Returns the spring of records as it is with the shifts of their zeros that the records show, from the one without any.
-fn with_zero_shifts(
-    records: &[Record],
-    mut identified: Identified,
-    mut models: Models,
-    input: Input,
-    units: &Units,
-) -> Identified {
+fn with_zero_shifts(records: &[Record], mut identified: Identified, mut models: Models, asked: Asked) -> Identified {
     let mut shifts = vec![Vec::new(); records.len()];
     // One edge of a stretch shows nothing as long as the other is missing, so that a better model is followed further.
     let mut latest: Option<(Identified, Models)> = None;
@@ -119,7 +146,7 @@ fn with_zero_shifts(
             break;
         }
         shifts.iter_mut().zip(further).for_each(|(known, further)| known.extend(further));
-        let with = of_all(records, &shifts, input, units);
+        let with = of_all(records, &shifts, asked);
         if with.1.held_out_rmse() > (1.0 - WORTHWHILE) * before.held_out_rmse() {
             break;
         }
@@ -188,17 +215,18 @@ fn leave_out(records: &mut Cow<[Record]>, far: Vec<Vec<usize>>, left_out: &mut V
 
 /// Identifies the spring of records that were checked, from all of their readings, with shifts of each record's zero from some times on,
 /// in s; without any if there are no lists of them.
-fn of_all(records: &[Record], shifts: &[Vec<f64>], input: Input, units: &Units) -> (Identified, Models) {
+fn of_all(records: &[Record], shifts: &[Vec<f64>], asked: Asked) -> (Identified, Models) {
+    let Asked { input, units, order: asked_order } = asked;
     let shifted = |(index, record): (usize, &Record)| {
         let after_first = shifts.get(index).into_iter().flatten().map(|at| at - record.rows[0].time_s);
         Series::new(record, input).shifted(after_first.collect())
     };
     let series: Vec<Series> = records.iter().enumerate().map(shifted).collect();
-    let mut models = Models::of(series.clone(), InputLaw::Linear);
+    let mut models = Models::of(series.clone(), InputLaw::Linear, asked_order);
     let linear = models.best();
     let both_signs = series.iter().any(Series::has_both_signs);
     if both_signs {
-        let even = Models::of(series.iter().map(Series::rectified).collect(), InputLaw::Even);
+        let even = Models::of(series.iter().map(Series::rectified).collect(), InputLaw::Even, asked_order);
         if even.held_out_rmse() < models.held_out_rmse() {
             models = even;
         }
@@ -209,7 +237,7 @@ fn of_all(records: &[Record], shifts: &[Vec<f64>], input: Input, units: &Units) 
     let squared: Vec<Series> = series.iter().map(|series| series.squared(full_scale)).collect();
     let (order, best) = models.fits.iter().enumerate().take(2).next_back().expect("a model of order 0");
     if best_up_to(&Problem::new(squared.clone()), order).last().expect("a model of order 0").cost < best.fit.cost {
-        let square = Models::of(squared, InputLaw::Square);
+        let square = Models::of(squared, InputLaw::Square, asked_order);
         if square.held_out_rmse() < most * models.held_out_rmse() {
             models = square;
         }

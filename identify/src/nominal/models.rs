@@ -43,6 +43,8 @@ pub(super) struct Models {
     /// The best model of each order.
     pub(super) fits: Vec<Model>,
     pub(super) chosen: usize,
+    /// The order that another one was chosen in place of, because it was asked for.
+    pub(super) in_place_of: Option<usize>,
 }
 
 /// The best model of one order.
@@ -66,20 +68,20 @@ pub struct BestLinear {
 }
 
 impl Models {
-    /// The best models, from rest if the records start at rest; with free responses all the same, if these explain what is left of the
+    /// The best models, the chosen one of `order` if there is one; from rest if the records start at rest; with free responses all the same, if these explain what is left of the
     /// best one: readings before the first voltage do not show a slow decay.
-    pub(super) fn of(series: Vec<Series>, law: InputLaw) -> Self {
-        let models = Self::with_starts(series, law);
+    pub(super) fn of(series: Vec<Series>, law: InputLaw, order: Option<usize>) -> Self {
+        let models = Self::with_starts(series, law, order);
         let from_rest = models.problem.series.iter().any(|series| series.is_at_rest());
         if !from_rest || !is_structured(&models.problem, &models.best_fit().residual) {
             return models;
         }
         let started = models.problem.series.iter().map(|series| series.clone().started()).collect();
-        let others = Self::with_starts(started, law);
+        let others = Self::with_starts(started, law, order);
         if is_structured(&others.problem, &others.best_fit().residual) { models } else { others }
     }
 
-    fn with_starts(series: Vec<Series>, law: InputLaw) -> Self {
+    fn with_starts(series: Vec<Series>, law: InputLaw, order: Option<usize>) -> Self {
         let problem = Problem::new(series);
         let with_errors = |fit: Fit| {
             let held_out = held_out_residual(&problem, &fit);
@@ -87,6 +89,11 @@ impl Models {
         };
         let mut fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
         let mut chosen = unbeaten(&problem, &fits);
+        if let Some(order) = order {
+            let in_place_of = Some(chosen).filter(|chosen| *chosen != order);
+            let chosen = order.min(fits.len() - 1);
+            return Self { law, problem, fits, chosen, in_place_of };
+        }
         // What the voltage does not drive may be all that made the model better than a smaller one.
         let largest = chosen;
         for _ in 0..=largest {
@@ -94,7 +101,7 @@ impl Models {
             fits[chosen] = with_errors(fit);
             chosen = unbeaten(&problem, &fits[..=largest]);
         }
-        Self { law, problem, fits, chosen }
+        Self { law, problem, fits, chosen, in_place_of: None }
     }
 
     /// Errors of the best model of each order from 1.

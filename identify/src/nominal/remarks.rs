@@ -119,10 +119,20 @@ fn shown(seconds: f64, units: &Units) -> String {
     format!("{} {}", significant(seconds / units.time.si, 4), units.time.name)
 }
 
-/// The remarks on an identification.
-pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Units) -> Vec<String> {
+/// The remarks on an identification, whose order was asked for `in_place_of` the one that would have been chosen.
+pub(super) fn remarks(
+    report: &Report,
+    in_place_of: Option<usize>,
+    problem: &Problem,
+    fit: &Fit,
+    units: &Units,
+) -> Vec<String> {
     let nominal = &report.nominal;
     let mut remarks = Vec::new();
+    if let Some(other) = in_place_of {
+        remarks
+            .push(format!("Order {} was asked for; the held-out errors are in favour of order {other}.", report.order));
+    }
     if report.input_law == InputLaw::Square {
         let full_scale = problem.series.iter().map(|series| series.full_scale()).fold(0.0, f64::max);
         remarks.push(format!(
@@ -168,7 +178,9 @@ pub(super) fn remarks(report: &Report, problem: &Problem, fit: &Fit, units: &Uni
     }
     if report.rmse > STRUCTURED * report.noise.scatter && report.noise.scatter > 0.0 {
         let order = report.linear.len();
-        let why = if order < LARGEST_ORDER {
+        let why = if let Some(larger) = in_place_of.filter(|other| *other > report.order) {
+            format!("a model of order {larger} describes more of the response")
+        } else if order < LARGEST_ORDER {
             let fewest = fewest_readings(problem, order + 1);
             format!("a model of order {} is not tried with fewer than {fewest} readings", order + 1)
         } else {
