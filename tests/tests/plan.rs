@@ -207,6 +207,9 @@ fn bad_input_is_one_line_that_says_what_was_expected() {
         "share":0.1,"even":false,"start":null,"full_scale_v":500,"sample_s":0.1,"uniform":true},"noise":{"sigma":1,"tail":null,
         "ar":[],"power":0,"half_step":0,"unexplained":0,"upper":null,"lower":null}}"#;
     write("good.json", &format!(r#"{{"schema":1,"verdict":"consistent","rivals":[],"experiment":{experiment}}}"#));
+    // The limit of a command that is no voltage is in its unit and has no amplifier's maximum.
+    let bar = experiment.replace("[relaxation]", r#"[units]\nvoltage = \"bar\"\n[relaxation]"#);
+    write("bar.json", &format!(r#"{{"schema":1,"verdict":"consistent","rivals":[],"experiment":{bar}}}"#));
     let unknown = r#"[{"causes":["ghost"],"nats":0,"blocks":[{"cause":"ghost","form":0,"point":[]}],"covariance":[]}]"#;
     write(
         "ghost.json",
@@ -214,6 +217,8 @@ fn bad_input_is_one_line_that_says_what_was_expected() {
     );
     let plan = |more: &[&str]| run(folder.path(), &[&["plan"], more].concat());
     assert!(plan(&["good.json"]).status.success());
+    let large = plan(&["bar.json", "--limit-v", "5000", "--slew-v-per-s", "2000"]);
+    assert!(large.status.success() && text(&large.stdout).contains("between 0 and 5000 bar"), "{large:?}");
     for (arguments, expected) in [
         (&["absent.json"][..], "absent.json: cannot be read"),
         (&["none.json"], "none.json, line 1, column "),
@@ -225,6 +230,8 @@ fn bad_input_is_one_line_that_says_what_was_expected() {
         (&["good.json", "--minutes", "0.01"], "--minutes 0.01: expected 0.06"),
         (&["good.json", "--limit-v", "-5"], "--limit-v -5: expected"),
         (&["good.json", "--limit-v", "1200"], "--limit-v 1200: expected above 0, at most 1000 V"),
+        (&["bar.json", "--limit-v", "2e9"], "--limit-v 2000000000: expected above 0, at most 1000000000 bar"),
+        (&["bar.json", "--slew-v-per-s", "1"], "--slew-v-per-s 1: expected at least 8.3"),
         (&["good.json", "--slew-v-per-s", "1"], "--slew-v-per-s 1: expected at least"),
     ] {
         let output = plan(arguments);

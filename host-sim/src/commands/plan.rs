@@ -36,10 +36,11 @@ pub(crate) struct Arguments {
     /// Duration of the experiment, in minutes; default: 4 for the report's spring, as many time constants for another
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     minutes: Option<f64>,
-    /// Largest magnitude of the voltage, in V; default: that of the record
+    /// Largest magnitude of the voltage, in V, at most 1000 V or the record's; of a command that is no voltage in its own
+    /// unit, without that maximum; default: that of the record
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     limit_v: Option<f64>,
-    /// Largest rate of change of the voltage, in V/s; default: steps
+    /// Largest rate of change of the voltage, in V/s, or in the unit of a command that is no voltage per s; default: steps
     #[arg(long, value_name = "V/S", allow_negative_numbers = true)]
     slew_v_per_s: Option<f64>,
     /// Write schedule.csv, plan.json, the diagnosis' spring as plant.toml, and plots of the schedule and of the predicted

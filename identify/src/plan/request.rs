@@ -50,14 +50,16 @@ pub struct Suspect {
 pub struct Request {
     /// Duration, in minutes; `None` for 4 minutes of a spring with the paper's time constant.
     pub minutes: Option<f64>,
-    /// Largest magnitude of the voltage, in V; `None` for the range of the record.
+    /// Largest magnitude of the voltage, in V, or in the unit of a command that is no voltage; `None` for the range of the record.
     pub limit_v: Option<f64>,
-    /// Largest rate of change of the voltage, in V/s; `None` for steps.
+    /// Largest rate of change of the voltage, in V/s, or in that unit per s; `None` for steps.
     pub slew_v_per_s: Option<f64>,
 }
 
 /// Largest voltage of any amplifier, in V: that of the tick's plant files.
 const AMPLIFIER_LIMIT_V: f64 = 1000.0;
+/// Largest command that is no voltage, in its unit.
+const MOST_OF_OTHER_UNIT: f64 = 1e9;
 /// Duration in normalised s unless the user asks for another: 4 minutes for the paper's spring.
 const DEFAULT_DURATION_S: f64 = 240.0;
 /// Fewest readings of an experiment that a diagnosis can use.
@@ -137,7 +139,7 @@ impl Request {
         let (mut low_v, mut high_v) = (experiment.lowest_v.min(0.0), experiment.highest_v.max(0.0));
         let widest = low_v.abs().max(high_v);
         // A record at 0 V names no range; one beyond the amplifiers of this project has an amplifier of its own.
-        let most_v = if widest > AMPLIFIER_LIMIT_V { widest } else { AMPLIFIER_LIMIT_V };
+        let most_v = widest.max(if command.is_voltage() { AMPLIFIER_LIMIT_V } else { MOST_OF_OTHER_UNIT });
         if let Some(limit_v) = self.limit_v {
             if !(limit_v > 0.0 && limit_v <= most_v) {
                 bad_input!("--limit-v {}: expected above 0, at most {} {unit}", number(limit_v), number(most_v));
