@@ -8,6 +8,10 @@ pub enum Dimension {
     /// A dimensionless number.
     #[default]
     Ratio,
+    /// A ratio to the response.
+    OfResponse,
+    /// A ratio to the full scale of the response: to what the largest voltage of the record settles at.
+    OfFullScale,
     /// A duration.
     Time,
     /// A time on the record's own clock.
@@ -34,7 +38,7 @@ impl Dimension {
     /// Returns the unit in which reports and files hold a number: s, Hz, V, or the reading's own; "" for a ratio.
     pub fn unit(self, units: &Units) -> String {
         match self {
-            Self::Ratio => String::new(),
+            Self::Ratio | Self::OfResponse | Self::OfFullScale => String::new(),
             Self::Time | Self::TimePoint => "s".into(),
             Self::Frequency => "Hz".into(),
             Self::Rate => "1/s".into(),
@@ -57,6 +61,8 @@ impl Dimension {
                 _ => format!("1/{time}"),
             },
             Self::Rate => format!("1/{time}"),
+            Self::OfResponse => "of the response".into(),
+            Self::OfFullScale => "of full scale".into(),
             Self::Voltage => voltage.clone(),
             Self::VoltageRate => format!("{voltage}/{time}"),
             _ => self.unit(units),

@@ -58,7 +58,7 @@ impl Other {
 
     fn number(self, dimension: Dimension, value: f64) -> f64 {
         match dimension {
-            Dimension::Ratio => value,
+            Dimension::Ratio | Dimension::OfResponse | Dimension::OfFullScale => value,
             Dimension::Time => self.time * value,
             Dimension::TimePoint => self.start_s + self.time * value,
             Dimension::Frequency | Dimension::Rate => value / self.time,

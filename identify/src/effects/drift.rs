@@ -222,13 +222,14 @@ impl Effect for Drift {
                 Quantity::new("at_s", Dimension::TimePoint, at_s),
             ];
         }
+        let relative = if matches!(form, WAVE | SETTLING) { Dimension::OfResponse } else { Dimension::OfFullScale };
         match form {
             WAVE | ADDED_WAVE => vec![
-                Quantity::new("amplitude", Dimension::Ratio, point[1].hypot(point[2])),
+                Quantity::new("amplitude", relative, point[1].hypot(point[2])),
                 Quantity::new("freq_hz", Dimension::Frequency, point[0]),
             ],
             SETTLING | ADDED_SETTLING => vec![
-                Quantity::new("change", Dimension::Ratio, point[0]),
+                Quantity::new("change", relative, point[0]),
                 Quantity::new("settling_s", Dimension::Time, point[1].exp()),
             ],
             _ => vec![Quantity::new("per_s", Dimension::Rate, point[0])],
@@ -267,6 +268,7 @@ mod tests {
     use super::*;
     use crate::record::input::Input;
     use simulation::record::{Record, Row};
+    use simulation::units::Units;
 
     const SECONDS: f64 = 240.0;
 
@@ -284,6 +286,19 @@ mod tests {
         let residual: Vec<f64> = data.reading.iter().zip(&data.time_s).map(drifts).collect();
         let waves = initial_waves(WAVE, &FitContext { data: &data, residual: &residual, sigma: 1.0 });
         waves.iter().map(|point| point[0] * SECONDS).collect()
+    }
+
+    /// Under an added wave it is no part of the response.
+    #[test]
+    fn an_amplitude_is_shown_with_what_it_is_relative_to() {
+        let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 1.0, measured: Some(1.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..50).map(row).collect() }, Input::Hold);
+        for (form, of) in [(WAVE, "response"), (ADDED_WAVE, "full scale"), (SETTLING, "response")] {
+            let amplitude = Drift.quantities(form, &[0.1, 0.2, 0.3], &data).remove(0);
+            let (unit, shown) =
+                (amplitude.dimension.unit(&Units::default()), amplitude.dimension.shown_unit(&Units::default()));
+            assert!(unit.is_empty() && shown.ends_with(of), "{form}: {shown}");
+        }
     }
 
     #[test]

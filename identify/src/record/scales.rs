@@ -50,7 +50,7 @@ impl Scales {
     /// Returns the size of a normalised unit in the file's unit.
     pub fn size(&self, dimension: Dimension) -> f64 {
         match dimension {
-            Dimension::Ratio => 1.0,
+            Dimension::Ratio | Dimension::OfResponse | Dimension::OfFullScale => 1.0,
             Dimension::Time | Dimension::TimePoint => self.second_s,
             Dimension::Frequency | Dimension::Rate => 1.0 / self.second_s,
             Dimension::Voltage => self.volt_v,
