@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use paper::beam::experiment::Experiment;
 use paper::beam::readings::Reading;
 use paper::beam::regression::Interval;
 use paper::beam::report::{self, Layers, Statics};
-use paper::beam::slip::Identified;
+use paper::beam::slip::{Identified, Predicted};
 
 /// Tables of the experiment, the beam of one material, and the stack.
 pub fn text(report: &report::Report) -> String {
@@ -16,7 +17,12 @@ pub fn text(report: &report::Report) -> String {
 }
 
 fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
-    let report::Report { experiment, deflection, layers } = report;
+    experiment(out, &report.experiment)?;
+    deflection(out, &report.deflection)?;
+    layers(out, &report.layers)
+}
+
+fn experiment(out: &mut String, experiment: &Experiment) -> std::fmt::Result {
     writeln!(out, "Beam experiment (95 % intervals)")?;
     writeln!(out, "  voltage | spring constant, all readings |         without the outliers | Young's modulus")?;
     writeln!(out, "      [V] |                     [uN/mm] |                      [uN/mm] |           [GPa]")?;
@@ -55,8 +61,10 @@ fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
         plus_minus(low, 4),
         plus_minus(high, 4),
         plus_minus(&experiment.reach_ratio, 3)
-    )?;
+    )
+}
 
+fn deflection(out: &mut String, deflection: &Statics) -> std::fmt::Result {
     writeln!(out, "\nBeam of one material, clamped at one end (upwards is positive)")?;
     writeln!(out, "  along the beam | linear |  exact, at a distance | valid")?;
     writeln!(out, "            [mm] |   [mm] |   [mm]           [mm] |  [mm]")?;
@@ -82,7 +90,10 @@ fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
     if let Some(factor) = deflection.limit_factor {
         writeln!(out, "The linear solution is valid up to {factor:.3} times this load (force and weight together).")?;
     }
+    Ok(())
+}
 
+fn layers(out: &mut String, layers: &Layers) -> std::fmt::Result {
     writeln!(out, "\nStack of layers, by finite elements with slip")?;
     writeln!(out, "  voltage | measured |  bonded | sliding | only active | coupling grows with |")?;
     writeln!(out, "      [V] |  [uN/mm] |         |         | layer grows | V        V squared  |")?;
@@ -120,31 +131,38 @@ fn write(out: &mut String, report: &report::Report) -> std::fmt::Result {
             "No stiffness of the active layer alone gives the measured spring constant at {highest_v} V."
         )?,
     }
-    if !layers.identified.tips.is_empty() {
-        writeln!(out, "\n  force | voltage | measured |   slip |  error | report's FEM |  error | bonded")?;
-        writeln!(out, "   [uN] |     [V] |     [mm] |   [mm] |    [%] |         [mm] |    [%] |   [mm]")?;
-        for tip in &layers.identified.tips {
-            let off = |value: f64| 1e2 * (value / tip.printed.measured_mm - 1.0);
-            writeln!(
-                out,
-                "  {:5} | {:7} | {:8.2} | {:6.3} | {:+6.1} | {:12.3} | {:+6.1} | {:6.3}",
-                tip.printed.force_un,
-                tip.printed.voltage_v,
-                tip.printed.measured_mm,
-                tip.slip_mm,
-                off(tip.slip_mm),
-                tip.printed.fem_mm,
-                off(tip.printed.fem_mm),
-                tip.bonded_mm
-            )?;
-        }
-    }
+    tips(out, &layers.identified.tips)?;
     let Layers { voltage_v, interlayer_pa_per_m, tip_mm, bonded_mm, sliding_mm, .. } = layers;
     writeln!(
         out,
         "Under the given force at {voltage_v} V, {interlayer_pa_per_m:.3e} Pa/m: {tip_mm:.3} mm ({bonded_mm:.3} bonded, \
          {sliding_mm:.3} sliding), small deflections."
     )
+}
+
+/// The displacements of the free end, computed and as the report prints them.
+fn tips(out: &mut String, tips: &[Predicted]) -> std::fmt::Result {
+    if tips.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\n  force | voltage | measured |   slip |  error | report's FEM |  error | bonded")?;
+    writeln!(out, "   [uN] |     [V] |     [mm] |   [mm] |    [%] |         [mm] |    [%] |   [mm]")?;
+    for tip in tips {
+        let off = |value: f64| 1e2 * (value / tip.printed.measured_mm - 1.0);
+        writeln!(
+            out,
+            "  {:5} | {:7} | {:8.2} | {:6.3} | {:+6.1} | {:12.3} | {:+6.1} | {:6.3}",
+            tip.printed.force_un,
+            tip.printed.voltage_v,
+            tip.printed.measured_mm,
+            tip.slip_mm,
+            off(tip.slip_mm),
+            tip.printed.fem_mm,
+            off(tip.printed.fem_mm),
+            tip.bonded_mm
+        )?;
+    }
+    Ok(())
 }
 
 fn plus_minus(interval: &Interval, decimals: usize) -> String {

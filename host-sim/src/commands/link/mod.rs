@@ -15,7 +15,7 @@ use host_sim::output::terminal::remark;
 use link::adaptation::Adaptation;
 use link::isolation::Isolation;
 use link::{Desired, Fault, Request};
-use session::{Session, seconds, stopped};
+use session::{Answer, Session, seconds, stopped};
 
 /// Communicate with the MCU over its serial link: status, set, arm, disarm, isolation, adaptation, watch, record, capture, model, settings
 #[derive(Args, Debug)]
@@ -186,22 +186,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     }
     let mut execute = || match &arguments.command {
         Command::Status => session.show_status(),
-        Command::Set(set) => {
-            let arms = set.arm && session.status.sample.state == link::State::Disarmed;
-            if set.arm {
-                session.order(Request::Arm)?;
-                if stopped() {
-                    bail!("{}: no target is set", arguments.port);
-                }
-            }
-            let done = session.order(Request::Set(target));
-            // After a signal the end of the session does it.
-            if done.is_err() && arms && !stopped() {
-                // What this command has armed does not stay so without the stiffness that it was armed for.
-                // Without its host the MCU ramps down by itself.
-                let _ = session.client.leave();
-            }
-            session.show_and_keep(done?, keep)
+        Command::Set(Set { arm, .. }) => {
+            let done = set(&mut session, &arguments.port, *arm, target)?;
+            session.show_and_keep(done, keep)
         }
         Command::Arm { .. } => {
             let done = session.order(Request::Arm)?;
@@ -212,14 +199,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
             session.show(done)
         }
         Command::Acknowledge { .. } => {
-            let stood = session.status.fault;
-            let done = session.order(Request::Acknowledge(fault))?;
-            if done.0 == link::State::Faulted {
-                let next = session.refresh()?.fault;
-                remark(&format!("{}: {fault} is acknowledged; another fault stands: {next}", arguments.port));
-            } else if stood == Fault::NONE {
-                remark(&format!("{}: no fault stands, so none was acknowledged", arguments.port));
-            }
+            let done = acknowledge(&mut session, &arguments.port, fault)?;
             session.show(done)
         }
         Command::Isolation { acknowledge } => {
@@ -239,4 +219,36 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let done = execute();
     let ctrl_c_is_usual = keep.is_some() || matches!(arguments.command, Command::Watch(_) | Command::Record(_));
     session.finish(done, ctrl_c_is_usual)
+}
+
+/// Sets the target, after arming the MCU if that is asked for.
+fn set(session: &mut Session, port: &str, arm: bool, target: Desired) -> Result<Answer> {
+    let arms = arm && session.status.sample.state == link::State::Disarmed;
+    if arm {
+        session.order(Request::Arm)?;
+        if stopped() {
+            bail!("{port}: no target is set");
+        }
+    }
+    let done = session.order(Request::Set(target));
+    // After a signal the end of the session does it.
+    if done.is_err() && arms && !stopped() {
+        // What this command has armed does not stay so without the stiffness that it was armed for.
+        // Without its host the MCU ramps down by itself.
+        let _ = session.client.leave();
+    }
+    done
+}
+
+/// Acknowledges a fault, and remarks on one that still stands and on none that stood.
+fn acknowledge(session: &mut Session, port: &str, fault: Fault) -> Result<Answer> {
+    let stood = session.status.fault;
+    let done = session.order(Request::Acknowledge(fault))?;
+    if done.0 == link::State::Faulted {
+        let next = session.refresh()?.fault;
+        remark(&format!("{port}: {fault} is acknowledged; another fault stands: {next}"));
+    } else if stood == Fault::NONE {
+        remark(&format!("{port}: no fault stands, so none was acknowledged"));
+    }
+    Ok(done)
 }

@@ -14,6 +14,9 @@ use serde::Serialize;
 use simulation::bad_input;
 use simulation::bad_input::number;
 
+/// The state of the MCU after a request, and its target.
+pub(super) type Answer = (link::State, WireVolts);
+
 /// The answer of `set`, `arm`, `disarm` and `acknowledge` with `--json`.
 #[derive(Serialize)]
 struct Done {
@@ -57,7 +60,7 @@ impl Session {
     }
 
     /// Sends a request. A stiffness out of reach is bad input; any other error is a failure.
-    pub(super) fn order(&mut self, request: Request) -> Result<(link::State, WireVolts)> {
+    pub(super) fn order(&mut self, request: Request) -> Result<Answer> {
         self.client.command(request)
     }
 
@@ -125,13 +128,13 @@ impl Session {
 
     /// Prints the answer, and stays connected for `time` even if it cannot be printed: lost output decides nothing about an
     /// armed MCU.
-    pub(super) fn show_and_keep(&mut self, done: (link::State, WireVolts), time: Option<Duration>) -> Result<()> {
+    pub(super) fn show_and_keep(&mut self, done: Answer, time: Option<Duration>) -> Result<()> {
         let shown = self.show(done);
         self.keep(time)?;
         shown
     }
 
-    pub(super) fn show(&self, (state, target): (link::State, WireVolts)) -> Result<()> {
+    pub(super) fn show(&self, (state, target): Answer) -> Result<()> {
         let done = Done { state: state.name(), target_v: target.to_f64() };
         let text = format!("{}, target {:.3} V\n", done.state, done.target_v);
         print(&if self.json { json(&done)? } else { text })

@@ -212,20 +212,35 @@ pub fn nominal(nominal: &Nominal, scales: &Scales) -> String {
 
 /// The findings, the held-out improvement, and the next experiment, one sentence each.
 pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<String> {
-    let unit = scales.unit(Dimension::ReadingSize);
+    let mut sentences: Vec<String> = unfinished(report).into_iter().collect();
+    sentences.extend(parts_to_take_out(report, scales));
+    sentences.push(verdict(name, report));
+    sentences.extend(improvement(report, scales));
+    sentences.extend(best_suspect(report, scales));
+    sentences.extend(open_alternatives(report));
+    sentences.extend(doubtful_findings(report));
+    sentences.extend(autocorrelated_noise(report, scales));
+    sentences.extend(leftover(report));
+    let next = || report.next_experiment.as_ref().map(|next| format!("To decide, {next}."));
+    sentences.extend(another_spring(report).or_else(next));
+    sentences
+}
+
+/// True if what is left of the readings, not what they lack, is why the record cannot decide.
+fn is_undecided(report: &answer::Report) -> bool {
+    report.verdict == Verdict::Insufficient && report.leftover.is_some() && report.would_show.is_none()
+}
+
+/// States the verdict with the causes.
+fn verdict(name: &str, report: &answer::Report) -> String {
     let effects = report.findings.iter().filter_map(|finding| index_of(finding.cause)).map(|index| EFFECTS[index]);
-    let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
-    let causes: Vec<String> = effects.map(|effect| format!("{} ({})", effect.cause(), effect.description())).collect();
+    let causes: Vec<String> =
+        effects.clone().map(|effect| format!("{} ({})", effect.cause(), effect.description())).collect();
     let margins = report.would_show.map(|Margins { gain, time_constant }| {
         format!("a gain off by {} or a time constant off by {}", off_by(gain), off_by(time_constant))
     });
-    let (one, rows) = (causes.len() == 1, report.rows);
-    // What is left of the readings, not what they lack, is why the record cannot decide.
-    let is_undecided =
-        report.verdict == Verdict::Insufficient && report.leftover.is_some() && report.would_show.is_none();
-    let unfinished = unfinished(report).into_iter();
-    let mut sentences: Vec<String> = unfinished.chain(parts_to_take_out(report, scales)).collect();
-    sentences.push(match report.verdict {
+    let rows = report.rows;
+    match report.verdict {
         Verdict::Explained if causes.is_empty() => {
             let with = if report.take_out.is_empty() { "With what single records show" } else { "Without that" };
             format!("{with}, the simulation agrees with {name} within the noise of {rows} readings.")
@@ -241,7 +256,7 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
                 margins.map_or_else(String::new, |off| format!(", in which {off} would have been detected"))
             )
         }
-        Verdict::Insufficient if is_undecided => {
+        Verdict::Insufficient if is_undecided(report) => {
             format!("{name} cannot decide whether the simulation is wrong.")
         }
         Verdict::Insufficient => format!(
@@ -260,10 +275,11 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             format!("The simulation is wrong on {name}, and no known cause explains it.")
         }
         Verdict::Unexplained => {
-            let explain = if one { "explains" } else { "explain" };
+            let explain = if causes.len() == 1 { "explains" } else { "explain" };
             format!("The simulation is wrong on {name}; {} {explain} only a part of the error.", causes.join(", "))
         }
         Verdict::Ambiguous | Verdict::Explained => {
+            let in_readings = effects.clone().all(|effect| effect.location() == Location::Reading);
             let is_coarse = report.findings.iter().all(|finding| finding.cause == "quantisation");
             let what = match (in_readings, report.alternatives.iter().any(Vec::is_empty)) {
                 (false, false) => format!("The simulation is wrong on {name}"),
@@ -274,87 +290,100 @@ pub fn sentences(name: &str, report: &answer::Report, scales: &Scales) -> Vec<St
             };
             format!("{what}: {}.", causes.join("; "))
         }
-    });
-    if !report.findings.is_empty() && report.take_out.is_empty() {
-        let it = if one { "it" } else { "them" };
-        let (before, after) = (&report.baseline, &report.extended.quality);
-        sentences.push(if report.extended.gain > SMALLEST_IMPROVEMENT {
-            format!(
-                "With {it} in the model, the held-out error decreases from {} to {} {unit}, by {:.1} %.",
-                number(before.held_out_rmse),
-                number(after.held_out_rmse),
-                100.0 * report.extended.gain
-            )
-        } else if after.rmse > (1.0 - SMALLEST_IMPROVEMENT) * before.rmse {
-            let whose = if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is noise of the readings" };
-            format!("With {it} in the model, the error stays at {} {unit}{whose}.", number(after.rmse))
-        } else {
-            format!(
-                "With {it} in the model, the error decreases from {} to {} {unit}, but the held-out error does not: the \
-                 other parts of the record do not predict it.",
-                number(before.rmse),
-                number(after.rmse)
-            )
-        });
     }
-    if report.verdict == Verdict::Unexplained
-        && let Some(suspect) = report.suspects.first()
-    {
-        let distance = match suspect.probability {
-            Some(value) => format!("with {}", probability(value)),
-            None => format!("{:.1} nats short of a finding", suspect.nats_short),
-        };
-        let (before, after) = (number(suspect.rmse_before), number(suspect.rmse_after));
-        let error = match suspect.rmse_after < suspect.rmse_before {
-            true => format!("it changes the error from {before} to {after} {unit}"),
-            false => format!("it does not lower the error, {before} {unit} without it and {after} {unit} with it"),
-        };
-        sentences.push(format!("The best suspect is {}, {distance}: {error}.", suspect.cause));
+}
+
+/// States by how much the findings reduce the error; `None` without any, or if parts of the plant file were taken out as well.
+fn improvement(report: &answer::Report, scales: &Scales) -> Option<String> {
+    if report.findings.is_empty() || !report.take_out.is_empty() {
+        return None;
     }
-    if !report.alternatives.is_empty() {
-        let is_right = report.baseline.rmse <= HARDLY_LARGER * report.extended.quality.rmse;
-        let nothing =
-            || if is_right { "no error at all".to_owned() } else { "a law that no cause describes".to_owned() };
-        let name = |set: &Vec<&str>| if set.is_empty() { nothing() } else { set.join(" with ") };
-        let (rejected, open): (Vec<_>, Vec<_>) = report.alternatives.iter().partition(|set| report.rejects(set));
-        if !open.is_empty() {
-            let open: Vec<String> = open.into_iter().map(name).collect();
-            sentences.push(format!("Alternatives that the data cannot reject: {}.", open.join("; ")));
-        }
-        let lacks = |finding: &&Finding| rejected.iter().any(|set| !set.contains(&finding.cause));
-        let doubtful = |finding: &&Finding| !finding.is_likely() || lacks(finding);
-        let doubtful: Vec<&str> = report.findings.iter().filter(doubtful).map(|finding| finding.cause).collect();
-        if !doubtful.is_empty() {
-            sentences.push(format!(
-                "Not certain enough: {}; a law that no cause describes may be in {} place.",
-                doubtful.join(", "),
-                if doubtful.len() == 1 { "its" } else { "their" }
-            ));
-        }
+    let unit = scales.unit(Dimension::ReadingSize);
+    let it = if report.findings.len() == 1 { "it" } else { "them" };
+    let (before, after) = (&report.baseline, &report.extended.quality);
+    Some(if report.extended.gain > SMALLEST_IMPROVEMENT {
+        format!(
+            "With {it} in the model, the held-out error decreases from {} to {} {unit}, by {:.1} %.",
+            number(before.held_out_rmse),
+            number(after.held_out_rmse),
+            100.0 * report.extended.gain
+        )
+    } else if after.rmse > (1.0 - SMALLEST_IMPROVEMENT) * before.rmse {
+        let whose =
+            if report.verdict == Verdict::Unexplained { "" } else { ": nearly all of it is noise of the readings" };
+        format!("With {it} in the model, the error stays at {} {unit}{whose}.", number(after.rmse))
+    } else {
+        format!(
+            "With {it} in the model, the error decreases from {} to {} {unit}, but the held-out error does not: the \
+             other parts of the record do not predict it.",
+            number(before.rmse),
+            number(after.rmse)
+        )
+    })
+}
+
+/// States which suspect comes closest to a finding; `None` if the record is explained, or there is none.
+fn best_suspect(report: &answer::Report, scales: &Scales) -> Option<String> {
+    let suspect = report.suspects.first().filter(|_| report.verdict == Verdict::Unexplained)?;
+    let unit = scales.unit(Dimension::ReadingSize);
+    let distance = match suspect.probability {
+        Some(value) => format!("with {}", probability(value)),
+        None => format!("{:.1} nats short of a finding", suspect.nats_short),
+    };
+    let (before, after) = (number(suspect.rmse_before), number(suspect.rmse_after));
+    let error = match suspect.rmse_after < suspect.rmse_before {
+        true => format!("it changes the error from {before} to {after} {unit}"),
+        false => format!("it does not lower the error, {before} {unit} without it and {after} {unit} with it"),
+    };
+    Some(format!("The best suspect is {}, {distance}: {error}.", suspect.cause))
+}
+
+/// States which other sets of causes the readings do not reject; `None` if they reject all.
+fn open_alternatives(report: &answer::Report) -> Option<String> {
+    let is_right = report.baseline.rmse <= HARDLY_LARGER * report.extended.quality.rmse;
+    let nothing = if is_right { "no error at all" } else { "a law that no cause describes" };
+    let name = |set: &Vec<&str>| if set.is_empty() { nothing.to_owned() } else { set.join(" with ") };
+    let open: Vec<String> = report.alternatives.iter().filter(|set| !report.rejects(set)).map(name).collect();
+    (!open.is_empty()).then(|| format!("Alternatives that the data cannot reject: {}.", open.join("; ")))
+}
+
+/// States which findings a law that no cause describes may stand behind; `None` if there are none.
+fn doubtful_findings(report: &answer::Report) -> Option<String> {
+    if report.alternatives.is_empty() {
+        return None;
     }
-    if report.verdict == Verdict::Consistent && report.next_experiment.is_some() {
-        let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
-        sentences.push(format!(
+    let rejected: Vec<_> = report.alternatives.iter().filter(|set| report.rejects(set)).collect();
+    let lacks = |finding: &&Finding| rejected.iter().any(|set| !set.contains(&finding.cause));
+    let is_doubtful = |finding: &&Finding| !finding.is_likely() || lacks(finding);
+    let doubtful: Vec<&str> = report.findings.iter().filter(is_doubtful).map(|finding| finding.cause).collect();
+    (!doubtful.is_empty()).then(|| {
+        format!(
+            "Not certain enough: {}; a law that no cause describes may be in {} place.",
+            doubtful.join(", "),
+            if doubtful.len() == 1 { "its" } else { "their" }
+        )
+    })
+}
+
+/// States that the noise hides slow effects of the spring; `None` if there is a cause, or no experiment that would show more.
+fn autocorrelated_noise(report: &answer::Report, scales: &Scales) -> Option<String> {
+    let Quality { rmse, one_step_rmse, .. } = report.extended.quality;
+    (report.verdict == Verdict::Consistent && report.next_experiment.is_some()).then(|| {
+        let unit = scales.unit(Dimension::ReadingSize);
+        format!(
             "The noise is autocorrelated: {} {unit} in free run, {} {unit} in one step. A slow effect of the spring \
              could be mistaken for it.",
             number(rmse),
             number(one_step_rmse)
-        ));
-    }
-    if let Some(leftover) = &report.leftover {
-        let small = if is_undecided || report.verdict == Verdict::Unexplained {
-            ""
-        } else {
-            "Too small to change this verdict: "
-        };
-        sentences.push(format!("{small}{leftover}."));
-    }
-    match (another_spring(report), &report.next_experiment) {
-        (Some(another), _) => sentences.push(another),
-        (None, Some(next)) => sentences.push(format!("To decide, {next}.")),
-        (None, None) => {}
-    }
-    sentences
+        )
+    })
+}
+
+/// States what no cause explains; `None` if nothing is left.
+fn leftover(report: &answer::Report) -> Option<String> {
+    let decides = !is_undecided(report) && report.verdict != Verdict::Unexplained;
+    let small = if decides { "Too small to change this verdict: " } else { "" };
+    report.leftover.as_ref().map(|leftover| format!("{small}{leftover}."))
 }
 
 fn row(text: &mut String, finding: &Finding, scales: &Scales) {
