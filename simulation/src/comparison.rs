@@ -70,7 +70,7 @@ impl Step {
     }
 }
 
-/// Runs the stair of ideal steps behind each of the amplifiers, on the controllers' model of the spring or on an actual spring. There
+/// Runs the stair of ideal steps, in steps of [`PlantFile::stair_step_v`], behind each of the amplifiers, on the controllers' model of the spring or on an actual spring. There
 /// each step is measured from the stiffness at its start. With a margin, the robust controller is among them.
 ///
 /// # Errors
@@ -96,11 +96,12 @@ pub fn compare(
     let gains = gains([None; 2], Controller::Paper, file, rate_hz)?;
     let limits = amplifiers.iter().map(|&amplifier| {
         let settings = settings(amplifier);
+        let stair = Schedule::ideal_stair_of(file.stair_step_v(amplifier));
         // As in `vsj stair`: where the range ends below the limit, only the sampled reference accepts targets at its
         // end.
         let steps = match settings.plant.plain().filter(|_| settings.amplifier.max_v == amplifier.max_v) {
-            Some(plant) => steps(with_plant(&settings, plant), gains, on, margin)?,
-            None => steps(settings, gains, on, margin)?,
+            Some(plant) => steps(with_plant(&settings, plant), &stair, gains, on, margin)?,
+            None => steps(settings, &stair, gains, on, margin)?,
         };
         Ok(AtLimit { limit_v: settings.amplifier.max_v, steps })
     });
@@ -121,14 +122,14 @@ type On<'a> = (&'a DifferingSpring, Option<f64>);
 
 fn steps<P: HasReference>(
     settings: Settings<P>,
+    stair: &Schedule,
     gains: Gains,
     on: Option<On>,
     margin: Option<Margin>,
 ) -> Result<Vec<Step>> {
     let of = |compensation| {
         let settings = Settings { compensation, ..settings };
-        let experiment =
-            Experiment { name: "the stair of ideal steps".to_owned(), schedule: Schedule::ideal_stair(), settings };
+        let experiment = Experiment { name: "the stair of ideal steps".to_owned(), schedule: stair.clone(), settings };
         Ok::<_, anyhow::Error>(match on {
             None => {
                 let run = experiment.run(|_, _| ())?;

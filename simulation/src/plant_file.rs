@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::bad_input;
 use crate::bad_input::{BadInput, excerpt, one_line};
 use crate::bounded_file::read_text;
+use crate::schedule::STAIR_STEP_V;
 use crate::units::UnitNames;
 
 /// Largest size of a plant file, in MiB: some ten thousand times that of the longest that a diagnosis writes.
@@ -442,6 +443,23 @@ impl PlantFile {
     pub fn behind(&self, amplifier: model::Amplifier) -> model::Amplifier {
         let Some(Amplifier { limit_v, slew_v_per_s, .. }) = self.amplifier else { return amplifier };
         amplifier.limited_to(limit_v, slew_v_per_s)
+    }
+
+    /// The size in V of the five steps of the stair on this spring behind an amplifier: the report's 100 V, or less where the stair would
+    /// end beyond the recorded limit, which a command that is no voltage shares with the amplifier's range, or at more than twice the end
+    /// of the law. Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
+    pub fn stair_step_v(&self, amplifier: model::Amplifier) -> f64 {
+        let recorded = self.amplifier.as_ref().and_then(|amplifier| amplifier.limit_v);
+        let of_other_command = self.units.as_ref().and_then(UnitNames::other_command).map(|_| amplifier.max_v);
+        let limit_v = recorded.into_iter().chain(of_other_command).fold(f64::INFINITY, f64::min);
+        let law_v = self.law.as_ref().and_then(|law| law.voltage_v.last().copied()).unwrap_or(f64::INFINITY);
+        let end_v = limit_v.min(law_v);
+        if end_v <= 0.0 || limit_v >= 5.0 * STAIR_STEP_V && law_v >= 2.5 * STAIR_STEP_V {
+            return STAIR_STEP_V;
+        }
+        let most_v = end_v / 7.0 * (1.0 + 1e-9);
+        let decade = 10f64.powf(most_v.log10().floor());
+        [5.0, 2.0, 1.0].into_iter().map(|digit| digit * decade).find(|step| *step <= most_v).unwrap_or(decade)
     }
 
     /// Names of the file's effects that neither the tick nor its amplifier stage simulates.

@@ -58,28 +58,39 @@ const ROUNDING_V: f64 = 1.0;
 
 /// Steps of the report's stair: 100 V every 10 s, from 20 s on.
 const STAIR_STARTS_S: [f64; 5] = [20.0, 30.0, 40.0, 50.0, 60.0];
-const STAIR_STEP_V: f64 = 100.0;
+/// Size of a step of the report's stair, in V.
+pub const STAIR_STEP_V: f64 = 100.0;
 const STAIR_END_S: f64 = 70.0;
 
 impl Schedule {
     /// The stair of the report's Appendix 8.1.2, whose steps are 0.1 s ramps because it is sampled every 0.1 s and
     /// interpolated.
     pub fn stair() -> Self {
-        Self::stair_with_ramps(0.1)
+        Self::stair_of(STAIR_STEP_V)
     }
 
     /// The stair of [`Schedule::stair`] with ideal steps.
     pub fn ideal_stair() -> Self {
-        Self::stair_with_ramps(0.0)
+        Self::ideal_stair_of(STAIR_STEP_V)
     }
 
-    fn stair_with_ramps(ramp_s: f64) -> Self {
+    /// The stair of [`Schedule::stair`] with steps of another size, in V.
+    pub fn stair_of(step_v: f64) -> Self {
+        Self::stair_with_ramps(0.1, step_v)
+    }
+
+    /// The stair of [`Schedule::ideal_stair`] with steps of another size, in V.
+    pub fn ideal_stair_of(step_v: f64) -> Self {
+        Self::stair_with_ramps(0.0, step_v)
+    }
+
+    fn stair_with_ramps(ramp_s: f64, step_v: f64) -> Self {
         let mut points = vec![(0.0, 0.0)];
         for (start, index) in STAIR_STARTS_S.into_iter().zip(0u8..) {
-            let level = STAIR_STEP_V * f64::from(index);
-            points.extend([(start, level), (start + ramp_s, level + STAIR_STEP_V)]);
+            let level = step_v * f64::from(index);
+            points.extend([(start, level), (start + ramp_s, level + step_v)]);
         }
-        points.push((STAIR_END_S, STAIR_STEP_V * STAIR_STARTS_S.len() as f64));
+        points.push((STAIR_END_S, step_v * STAIR_STARTS_S.len() as f64));
         Self::new(points, Between::Linear)
     }
 

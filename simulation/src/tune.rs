@@ -20,7 +20,7 @@ use serde::Serialize;
 use crate::bad_input::BadInput;
 use crate::experiment::{Run, one_loop};
 use crate::plant_file::PlantFile;
-use crate::response::measure;
+use crate::response::{Response, measure};
 use crate::schedule::Schedule;
 
 pub use margins::Margins;
@@ -97,20 +97,34 @@ impl Specification<'_> {
         }
     }
 
+    /// The stair of ideal steps.
+    fn stair(&self) -> Schedule {
+        Schedule::ideal_stair_of(self.file.stair_step_v(self.amplifier))
+    }
+
     /// Runs the fixed-point loop over the ideal stair; the stiffness is that of its own model.
     ///
     /// # Errors
     /// [`BadInput`] for settings that the tick rejects.
     fn run(&self, compensation: Compensation) -> Result<Run> {
         let config = self.settings(compensation).validate().map_err(BadInput::from)?.quantize();
-        let schedule = Schedule::ideal_stair();
+        let schedule = self.stair();
         let with = one_loop(&config, &schedule.at_ticks(self.rate_hz), |_| ())?;
         Ok(Run { start_s: schedule.start_s(), rate_hz: self.rate_hz, with, without: Vec::new() })
     }
 
+    fn responses(&self, run: &Run) -> Vec<Response> {
+        self.stair().changes().iter().map(|change| measure(run, &run.with, change, None)).collect()
+    }
+
+    /// The worst response of a run over the stair.
+    fn worst_of(&self, run: &Run) -> Worst {
+        Worst::of(self.responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
+    }
+
     /// The worst response on the stair; `None` if the tick rejects the settings.
     fn worst(&self, compensation: Compensation) -> Option<Worst> {
-        Some(worst(&self.run(compensation).ok()?))
+        Some(self.worst_of(&self.run(compensation).ok()?))
     }
 
     /// The gains with the shortest t97; `None` if no gains meet the limits.
@@ -149,7 +163,7 @@ impl Specification<'_> {
     /// The longest approach that meets the limits.
     fn approach(&self) -> Result<TunedApproach> {
         let with = |time_constant_s| Compensation::TimeOptimal(Approach { time_constant_s });
-        let steps = |compensation| self.run(compensation).map(|run| responses(&run));
+        let steps = |compensation| self.run(compensation).map(|run| self.responses(&run));
         let dead_beat = steps(with(0.0))?;
         let good_enough = |approach_s: f64| -> Result<bool> {
             let mut pairs = steps(with(approach_s))?.into_iter().zip(&dead_beat);
@@ -166,7 +180,7 @@ impl Specification<'_> {
             }
             approach_s = tried;
         }
-        Ok(TunedApproach { approach_s, worst: worst(&self.run(with(approach_s))?) })
+        Ok(TunedApproach { approach_s, worst: self.worst_of(&self.run(with(approach_s))?) })
     }
 }
 
@@ -186,19 +200,10 @@ pub fn tune(specification: &Specification<'_>) -> Result<Tuning> {
     ];
     let runs = compensations.map(|compensation| compensation.map(|it| specification.run(it)).transpose());
     let [with_gains, with_approach] = runs;
-    let trade = trade::over_model_errors(specification.file, with_gains?.as_ref(), with_approach?.as_ref());
+    let trade = trade::over_model_errors(specification, with_gains?.as_ref(), with_approach?.as_ref());
     let evaluated = |knowledge| uncertainty::evaluate(specification, approach, knowledge);
     let uncertainty = specification.knowledge.as_ref().map(evaluated).transpose()?;
     Ok(Tuning { limit_v: specification.amplifier.max_v, proportional_integral, fast, trade, uncertainty })
-}
-
-fn responses(run: &Run) -> Vec<crate::response::Response> {
-    Schedule::ideal_stair().changes().iter().map(|change| measure(run, &run.with, change, None)).collect()
-}
-
-/// The worst response of a run over the stair.
-fn worst(run: &Run) -> Worst {
-    Worst::of(responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
 }
 
 fn three_digits(value: f64) -> f64 {

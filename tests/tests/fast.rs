@@ -176,6 +176,39 @@ fn the_documentation_shows_how_well_the_spring_has_to_be_known() {
     assert!(stdout.contains(&format!("{:.3}", times.fold(0.0, f64::max))), "{report} {stdout}");
 }
 
+/// The heater's command is in percent, and its law ends there: targets of 100 to 500 % would be beyond its range.
+#[test]
+fn steps_are_within_the_range_of_the_spring() {
+    let folder = tempdir().unwrap();
+    let units = "schema = 1\n[units]\nvoltage = \"%\"\n[relaxation]\nshare = 0.1\ntau_s = 4.0\n";
+    let law = "[law]\nvoltage_v = [0.0, 50.0, 100.0]\nstiffness = [0.0, 25.0, 100.0]\n";
+    let limit = "[amplifier]\nlimit_v = 100.0\n";
+    for (name, plant, options) in [
+        ("limit.toml", units.to_owned() + limit, &["--limit-v", "700"][..]),
+        ("volts.toml", units.replace('%', "V") + limit, &["--limit-v", "700"]),
+        ("option.toml", units.to_owned(), &["--limit-v", "100"]),
+        ("law.toml", units.to_owned() + law, &["--limit-v", "700"]),
+    ] {
+        fs::write(folder.path().join(name), plant).unwrap();
+        let answer = |command| json(folder.path(), &[&[command, "--plant", name, "--json"], options].concat());
+        let compared = answer("compare");
+        let steps = compared["limits"][0]["steps"].as_array().unwrap();
+        let ends: Vec<f64> = steps.iter().map(|step| number(&step["fast"], "to_v")).collect();
+        assert_eq!(ends, [10.0, 20.0, 30.0, 40.0, 50.0], "{name}");
+        assert!(steps.iter().all(|step| number(&step["fast"], "t97_s") < 1.0), "{name}: {compared}");
+        assert!(answer("tune")["fast"]["t97_s"].is_number(), "{name}");
+        let stair = answer("stair");
+        assert_eq!(stair["steps"][4]["to_v"], 50.0, "{name}");
+        if name != "law.toml" {
+            let bound = answer("bound");
+            assert!(bound["steps"][4]["known_s"].is_number() && bound["steps"][4]["to_v"] == 50.0, "{name}: {bound}");
+        }
+    }
+    let said = run(folder.path(), &["tune", "--plant", "limit.toml"]);
+    let remark = "vsj: limit.toml: the stair has steps of 10 % up to 50 %, within the spring's own range\n";
+    assert!(text(&said.stderr).ends_with(remark), "{}", text(&said.stderr));
+}
+
 /// A spring without an instantaneous share, as a record shows it: the error of the share is a part of the response.
 #[test]
 fn a_share_near_zero_is_known_to_a_part_of_the_response() {

@@ -18,8 +18,9 @@ use super::spring_error::ErrorOf;
 /// Compute how fast any controller without a sensor can be on a spring that is known only to within errors, and how well the spring has
 /// to be known
 ///
-/// One voltage has to bring the nominal spring and those at all ends of the errors to 97 % of each step of 100 V, and keep them there,
-/// without more overshoot than is allowed. A linear programme finds the shortest time.
+/// One voltage has to bring the nominal spring and those at all ends of the errors to 97 % of each step, and keep them there, without
+/// more overshoot than is allowed. A linear programme finds the shortest time. The steps are those of `vsj compare`: 100 V, smaller where
+/// the spring's own range is too small for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -67,6 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let spring_error = errors_with_small_shares("--spring-error", given, identified, LARGEST)?;
     let file = plant::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
+    plant::remark_on_stair(&arguments.plant, &file, amplifier);
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };
     let answer =
         answer(&file, &Question { allowed, spring_error, within_s }).map_err(|error| named(error, SETTINGS))?;

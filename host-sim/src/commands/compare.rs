@@ -13,6 +13,8 @@ use super::plant;
 use super::spring_error::{ErrorOf, Known, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
+///
+/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's amplifier, law or command is too small for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -82,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
+    amplifiers.iter().take(1).for_each(|&amplifier| plant::remark_on_stair(&arguments.plant, &file, amplifier));
     let actual = arguments.actual()?;
     let margin = arguments.known.margin()?;
     let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)

@@ -2,8 +2,10 @@
 
 use anyhow::Result;
 use link::WireModel;
-use simulation::bad_input::BadInput;
+use model::Amplifier;
+use simulation::bad_input::{BadInput, number};
 use simulation::plant_file::{self, PlantFile};
+use simulation::schedule::STAIR_STEP_V;
 
 use host_sim::output::terminal::remark;
 
@@ -40,6 +42,18 @@ pub(crate) fn remark_on(name: &str, file: &PlantFile) {
     if let Some(unit) = file.units.as_ref().and_then(|units| units.other_command()) {
         remark(&format!(
             "{name}: the command is in {unit}: every V of target, voltage and stiffness is a {unit}, within the range of --limit-v"
+        ));
+    }
+}
+
+/// Remarks on a stair whose steps are not those of the report because the spring's own range is too small for them.
+pub(crate) fn remark_on_stair(name: &str, file: &PlantFile, amplifier: Amplifier) {
+    let step_v = file.stair_step_v(amplifier);
+    if step_v != STAIR_STEP_V {
+        let unit = file.units.as_ref().and_then(|units| units.other_command()).unwrap_or("V");
+        let [step, end] = [step_v, 5.0 * step_v].map(number);
+        remark(&format!(
+            "{name}: the stair has steps of {step} {unit} up to {end} {unit}, within the spring's own range"
         ));
     }
 }

@@ -25,6 +25,8 @@ use simulation::record::{MEASURED, Record};
 use simulation::schedule::Between;
 
 /// Run the stair experiment in closed loop on the fixed-point controller, compared with the report's Table 3
+///
+/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's amplifier, law or command is too small for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -133,6 +135,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template("{bar:40} {percent} % of {len} ticks")?);
     let request = arguments.request(options, &file, target);
     request.check().map_err(|error| named(error, SETTINGS))?;
+    if record.is_none() {
+        plant::remark_on_stair(&arguments.control.plant, &file, request.amplifier);
+    }
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);

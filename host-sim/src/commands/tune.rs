@@ -17,6 +17,8 @@ use super::plant;
 use super::spring_error::ErrorOf;
 
 /// Choose gains and settings for a spring and an amplifier, with stability margins and the effect of model errors
+///
+/// For the stair of `vsj compare`: steps of 100 V, smaller where the spring's own range is too small for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -84,6 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
+    plant::remark_on_stair(&arguments.plant, &file, amplifier);
     let knowledge = arguments.knowledge()?;
     let specification =
         Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent, knowledge };

@@ -13,7 +13,7 @@ use super::{Report, Rows};
 /// The target over time.
 #[derive(Clone, Copy, Debug)]
 pub enum Target<'a> {
-    /// The report's stair, with its 0.1 s ramps.
+    /// The report's stair, with its 0.1 s ramps, in steps of [`PlantFile::stair_step_v`].
     Stair,
     /// The same stair as ideal steps.
     Step,
@@ -95,9 +95,10 @@ impl Request<'_> {
         is_the_reports: impl Fn(&Settings<P>) -> bool,
         progress: impl FnMut(usize, usize),
     ) -> Result<Answer> {
+        let step_v = self.plant.stair_step_v(self.amplifier);
         let (name, schedule) = match self.target {
-            Target::Stair => ("the stair".to_owned(), Schedule::stair()),
-            Target::Step => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair()),
+            Target::Stair => ("the stair".to_owned(), Schedule::stair_of(step_v)),
+            Target::Step => ("the stair of ideal steps".to_owned(), Schedule::ideal_stair_of(step_v)),
             Target::Record(record, between) => {
                 record.check_range(self.amplifier.min_v, self.amplifier.max_v)?;
                 (record.name.clone(), Schedule::from_record(record, between))

@@ -71,17 +71,17 @@ pub struct Needed {
 }
 
 impl Needed {
-    /// The errors with which all steps of the ideal stair take at most `within_s`.
-    pub fn of(bound: &RobustBound<'_>, within_s: f64) -> Self {
-        let steps = steps();
+    /// The errors with which all steps of the ideal stair, of `step_v` each, take at most `within_s`.
+    pub fn of(bound: &RobustBound<'_>, within_s: f64, step_v: f64) -> Self {
+        let steps = steps(step_v);
         let of = |parameter| bound.needed(parameter, within_s, &steps);
         Self { share: of(Parameter::Share), time_constant: of(Parameter::TimeConstant), gain: of(Parameter::Gain) }
     }
 }
 
-/// Voltages in V before and after each step of the ideal stair.
-fn steps() -> Vec<(f64, f64)> {
-    Schedule::ideal_stair().changes().iter().map(|change| (change.from_v, change.to_v)).collect()
+/// Voltages in V before and after each step of the ideal stair, of `step_v` each.
+fn steps(step_v: f64) -> Vec<(f64, f64)> {
+    Schedule::ideal_stair_of(step_v).changes().iter().map(|change| (change.from_v, change.to_v)).collect()
 }
 
 /// Computes the bounds of the stair's steps and the errors that a time allows.
@@ -93,6 +93,7 @@ pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
     // The rate has no part in it.
     allowed.amplifier.validate(SampleTime::from_rate(1000.0).map_err(BadInput::from)?).map_err(BadInput::from)?;
     let bound = RobustBound::new(file, allowed)?;
+    let step_v = file.stair_step_v(allowed.amplifier);
     let of = |&(from_v, to_v): &(f64, f64)| {
         let known_s = bound.shortest_s(from_v, to_v, &SpringError::default());
         let (t97_s, nominal_first_s) = if spring_error == SpringError::default() {
@@ -109,8 +110,8 @@ pub fn answer(file: &PlantFile, question: &Question) -> Result<Answer> {
         slew_v_per_s: allowed.amplifier.slew_v_per_s,
         overshoot_percent: 100.0 * allowed.overshoot,
         spring_error,
-        steps: steps().iter().map(of).collect(),
+        steps: steps(step_v).iter().map(of).collect(),
         within_s,
-        needed: Needed::of(&bound, within_s),
+        needed: Needed::of(&bound, within_s, step_v),
     })
 }

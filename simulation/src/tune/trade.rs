@@ -7,11 +7,10 @@ use model::ScaledStiffness;
 use serde::Serialize;
 
 use crate::experiment::{Run, Sample};
-use crate::plant_file::PlantFile;
 use crate::response::{from_present, measure};
 use crate::sampled;
-use crate::schedule::Schedule;
 use crate::spring_error::{DifferingSpring, Parameter, SpringError};
+use crate::tune::Specification;
 use crate::tune::worst::Worst;
 
 /// Both controllers on a spring that differs from their model.
@@ -28,22 +27,26 @@ pub struct Trade {
 }
 
 /// Evaluates errors of -50 % to +50 % in steps of 5 %.
-pub(super) fn over_model_errors(file: &PlantFile, with_gains: Option<&Run>, fast: Option<&Run>) -> Vec<Trade> {
+pub(super) fn over_model_errors(
+    specification: &Specification,
+    with_gains: Option<&Run>,
+    fast: Option<&Run>,
+) -> Vec<Trade> {
     let mut trade = Vec::new();
     for parameter in Parameter::ALL {
         for part in -10..=10 {
             let error = f64::from(part) / 20.0;
             let errors = SpringError::default().with(parameter, error);
-            let on = |run: Option<&Run>| run.map(|run| with_errors(file, &errors, run));
+            let on = |run: Option<&Run>| run.map(|run| with_errors(specification, &errors, run));
             trade.push(Trade { parameter, error, proportional_integral: on(with_gains), fast: on(fast) });
         }
     }
     trade
 }
 
-/// Worst response when the voltages of `run` drive a spring that differs from the file's by these errors.
-pub(super) fn with_errors(file: &PlantFile, errors: &SpringError, run: &Run) -> Worst {
-    let differing = DifferingSpring::new(file, errors);
+/// Worst response when the voltages of `run` drive a spring that differs from the specified one by these errors.
+pub(super) fn with_errors(specification: &Specification, errors: &SpringError, run: &Run) -> Worst {
+    let differing = DifferingSpring::new(specification.file, errors);
     let times: Vec<f64> = (0..run.with.len()).map(|tick| run.time_s(tick)).collect();
     let volts: Vec<f64> = run.with.iter().map(|sample| sample.applied.to_f64()).collect();
     let stiffness = sampled::simulate(&differing.spring(), &times, &volts);
@@ -52,7 +55,7 @@ pub(super) fn with_errors(file: &PlantFile, errors: &SpringError, run: &Run) -> 
         ..*sample
     };
     let samples: Vec<Sample> = run.with.iter().zip(stiffness).map(answered).collect();
-    let each = Schedule::ideal_stair().changes().into_iter().map(|change| {
+    let each = specification.stair().changes().into_iter().map(|change| {
         let response = measure(run, &samples, &from_present(run, &samples, &change), None);
         (response.t97_s, response.overshoot_percent)
     });

@@ -94,18 +94,18 @@ pub(super) fn evaluate(
     ];
     let controllers = compensations.into_iter().map(|(controller, compensation)| {
         let run = specification.run(compensation)?;
-        let on = |errors: &[SpringError]| errors.iter().map(|error| with_errors(file, error, &run)).collect();
+        let on = |errors: &[SpringError]| errors.iter().map(|error| with_errors(specification, error, &run)).collect();
         let (at_ends, at_drawn): (Vec<Worst>, Vec<Worst>) = (on(&ends), on(&drawn));
         Ok(Within {
             controller,
-            nominal: with_errors(file, &SpringError::default(), &run),
+            nominal: with_errors(specification, &SpringError::default(), &run),
             worst_95: quantile(&at_drawn),
             guaranteed: Worst::of(at_ends.iter().map(|worst| (worst.t97_s, worst.overshoot_percent))),
         })
     });
     let controllers = controllers.collect::<Result<_>>()?;
     let bound = RobustBound::new(file, Allowed { amplifier, overshoot }).ok();
-    let needed = bound.map(|bound| Needed::of(&bound, within_s));
+    let needed = bound.map(|bound| Needed::of(&bound, within_s, file.stair_step_v(amplifier)));
     Ok(Uncertainty { spring_error, controllers, within_s, overshoot_percent, needed, remarks })
 }
 
