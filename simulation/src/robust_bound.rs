@@ -44,7 +44,7 @@ const RESOLUTION: (f64, f64) = (0.01, 1e-4);
 /// Part of a step that counts as reached.
 const REACHED: f64 = 0.97;
 /// Largest error of a parameter that is tried, and the resolution of [`RobustBound::needed`].
-const LARGEST_ERROR: (f64, f64) = (0.25, 1e-3);
+pub const LARGEST_ERROR: (f64, f64) = (0.25, 1e-3);
 
 /// A step from rest behind an amplifier, and what is allowed on the way.
 #[derive(Clone, Copy, Debug)]
@@ -118,8 +118,19 @@ impl<'a> RobustBound<'a> {
     /// Only the first and the last step are tried: relative to the old voltage, the range of a step between them is a weighted mean of
     /// theirs, and so the mean of their voltages is possible there.
     pub fn needed(&self, parameter: Parameter, within_s: f64, steps: &[(f64, f64)]) -> Option<f64> {
+        self.largest(|size| SpringError::default().with(parameter, size), within_s, steps)
+    }
+
+    /// Returns the same of the instantaneous share as a part of the response, which also says something of a share near 0.
+    pub fn needed_of_response(&self, within_s: f64, steps: &[(f64, f64)]) -> Option<f64> {
+        let of_response = |share_of_response| SpringError { share_of_response, ..SpringError::default() };
+        self.largest(of_response, within_s, steps)
+    }
+
+    /// Returns the largest size of an error with which all steps take at most `within_s`.
+    fn largest(&self, error: impl Fn(f64) -> SpringError, within_s: f64, steps: &[(f64, f64)]) -> Option<f64> {
         let possible = |size: f64| {
-            let springs = self.springs(&SpringError::default().with(parameter, size));
+            let springs = self.springs(&error(size));
             let ends = [steps.last(), steps.first()].into_iter().flatten();
             ends.into_iter().all(|&(from_v, to_v)| self.is_possible(within_s, f64::INFINITY, from_v, to_v, &springs))
         };

@@ -234,6 +234,10 @@ fn a_share_near_zero_is_known_to_a_part_of_the_response() {
         times.push(slowest(&bound));
     }
     assert!(times[0] < 0.9 * times[1], "{times:?}");
+    // So is how well it has to be known: a quarter of next to nothing says nothing.
+    let bound = run(folder.path(), &["bound", "--within-s", "2", "--plant", "plant.toml"]);
+    let share = text(&bound.stdout).lines().find(|line| line.starts_with("  share ")).unwrap().to_owned();
+    assert!(share.contains(" %") && share.contains(" of the response"), "{share}");
     let tuned = run(folder.path(), &arguments("tune"));
     assert!(text(&tuned.stdout).contains("known to within errors: share to +-6.000 % of the response, time constant"));
     let remark =

@@ -1,7 +1,7 @@
 //! The answer of `vsj bound` as text.
 
 use crate::output::cells::{line, optional, tidy};
-use simulation::robust_bound::{Answer, Needed, OF_KNOWN};
+use simulation::robust_bound::{Answer, LARGEST_ERROR, Needed, OF_KNOWN};
 use simulation::spring_error::{Parameter, SpringError};
 
 /// The shortest times of all steps, and how well the spring has to be known.
@@ -59,9 +59,16 @@ pub(crate) fn errors(spring_error: &SpringError) -> String {
 pub(crate) fn needed(needed: &Needed, within_s: f64) -> String {
     let mut text =
         format!("For all steps in {} s the spring has to be known, each parameter alone, to\n", tidy(within_s));
-    for (parameter, needed) in Parameter::ALL.into_iter().zip([needed.share, needed.time_constant, needed.gain]) {
-        let needed = needed
-            .map_or("impossible even if it is known exactly".to_owned(), |needed| format!("+-{:.1} %", 100.0 * needed));
+    let (share, of) = match needed.share_of_response {
+        Some(of_response) => (Some(of_response), " of the response"),
+        None => (needed.share, ""),
+    };
+    let each = [(share, of), (needed.time_constant, ""), (needed.gain, "")];
+    for (parameter, (needed, of)) in Parameter::ALL.into_iter().zip(each) {
+        let needed = needed.map_or("impossible even if it is known exactly".to_owned(), |needed| {
+            let or_more = if needed + LARGEST_ERROR.1 < LARGEST_ERROR.0 { "" } else { " or more" };
+            format!("+-{:.1} %{of}{or_more}", 100.0 * needed)
+        });
         line(&mut text, &format!("  {:<14} {needed}", parameter.name()));
     }
     text

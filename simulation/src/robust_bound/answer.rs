@@ -13,6 +13,9 @@ use crate::spring_error::{Parameter, SpringError};
 /// Multiple of its own shortest time in which the nominal spring is at 97 % for [`Step::nominal_first_s`].
 pub const OF_KNOWN: f64 = 1.05;
 
+/// Instantaneous share of which a relative error says little.
+const SMALL_SHARE: f64 = 0.01;
+
 /// What is asked of [`answer`].
 #[derive(Clone, Copy, Debug)]
 pub struct Question {
@@ -64,6 +67,9 @@ pub struct Step {
 pub struct Needed {
     /// Largest relative error of the instantaneous share.
     pub share: Option<f64>,
+    /// Largest error of an instantaneous share that is near 0, as a part of the response; `None` also for another share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share_of_response: Option<f64>,
     /// Largest relative error of all time constants.
     pub time_constant: Option<f64>,
     /// Largest relative error of the gain of the whole response.
@@ -75,7 +81,14 @@ impl Needed {
     pub fn of(bound: &RobustBound<'_>, within_s: f64, step_v: f64) -> Self {
         let steps = steps(step_v);
         let of = |parameter| bound.needed(parameter, within_s, &steps);
-        Self { share: of(Parameter::Share), time_constant: of(Parameter::TimeConstant), gain: of(Parameter::Gain) }
+        let of_response = || bound.needed_of_response(within_s, &steps);
+        let share_of_response = (bound.file.relaxation.share < SMALL_SHARE).then(of_response).flatten();
+        Self {
+            share: of(Parameter::Share),
+            share_of_response,
+            time_constant: of(Parameter::TimeConstant),
+            gain: of(Parameter::Gain),
+        }
     }
 }
 
