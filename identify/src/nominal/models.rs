@@ -68,8 +68,8 @@ pub struct BestLinear {
 }
 
 impl Models {
-    /// The best models, the chosen one of `order` if there is one; from rest if the records start at rest; with free responses all the same, if these explain what is left of the
-    /// best one: readings before the first voltage do not show a slow decay.
+    /// The best models, of which that of `order` is chosen if one is given. They start from rest if the records do; with free responses
+    /// all the same, if these explain what is left of the best one: readings before the first voltage do not show a slow decay.
     pub(super) fn of(series: Vec<Series>, law: InputLaw, order: Option<usize>) -> Self {
         let models = Self::with_starts(series, law, order);
         let from_rest = models.problem.series.iter().any(|series| series.is_at_rest());
