@@ -1,6 +1,6 @@
 //! Causes that can stand in for each other are named each for itself.
 
-use identify::{Options, Report, diagnose};
+use identify::{Input, Options, Report, diagnose};
 use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
@@ -159,4 +159,49 @@ fn readings_that_are_cut_off_leave_a_gain_a_gain() {
     assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "time-constant"]);
     let spring = Spring { gain: 0.82, tau_s: 3.1, quicker: 2.3, cut_v: 9.0, held: 40, ..PAPER };
     assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "voltage-dependent-time-constant"]);
+}
+
+/// A share that is negative for a short time makes a response that is late and reverses first, which ramps hardly distinguish from one that
+/// is late and lags.
+#[test]
+fn a_delay_and_a_lag_in_series_are_no_share_that_reverses() {
+    const ROW_S: f64 = 0.275;
+    const STEPS: usize = 50;
+    let late = (0.95 / ROW_S * STEPS as f64).round() as usize;
+    for seed in 1..=3u32 {
+        let mut state = seed;
+        let mut uniform = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24)
+        };
+        // Ramps between random levels, most of them followed by a rest.
+        let mut volts = vec![0.0; 20];
+        while volts.len() < 900 {
+            let (from, to) = (volts[volts.len() - 1], (500.0 * uniform()).round());
+            let rows = 4.0 + (96.0 * uniform() * uniform()).round();
+            volts.extend((1..=rows as usize).map(|row| from + (to - from) * row as f64 / rows));
+            if uniform() < 0.6 {
+                volts.extend(vec![to; (6.0 + 74.0 * uniform()) as usize]);
+            }
+        }
+        let volts_at = |step: usize| {
+            let (row, part) = (step / STEPS, (step % STEPS) as f64 / STEPS as f64);
+            volts[row] + part * (volts[row + 1] - volts[row])
+        };
+        let (mut lag, mut series) = (0.0, 0.0);
+        let rows = (0..850).map(|row| {
+            let noise = 2.0 * (uniform() + uniform() + uniform() - 1.5);
+            let reading = series + noise;
+            for step in row * STEPS..(row + 1) * STEPS {
+                let across_v = volts_at(step.saturating_sub(late));
+                lag += (across_v - lag) * ROW_S / STEPS as f64 / PAPER.tau_s;
+                series += (PAPER.share * across_v + (1.0 - PAPER.share) * lag - series) * ROW_S / STEPS as f64 / 0.54;
+            }
+            Row { line: row + 2, time_s: ROW_S * row as f64, voltage_v: volts[row], measured: Some(reading) }
+        });
+        let record = Record { name: String::new(), rows: rows.collect() };
+        let report = diagnose(&record, &Options { input: Input::Linear, ..Options::default() }).unwrap();
+        let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+        assert_eq!(causes, ["delay", "series-lag"], "{seed}: {:?}, {:?}", report.verdict, report.findings);
+    }
 }

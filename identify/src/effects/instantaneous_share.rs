@@ -4,6 +4,9 @@
 //! | --- | --- |
 //! | instantaneous | `y = share q + (1 - share) lag(tau; q)` |
 //! | quick | `y = share_0 q + part lag(quick; q) + (1 - share_0 - part) lag(tau; q)`: a part takes a short time |
+//!
+//! A quick part that is negative is at most the share that it follows: with more, the response to a step would reverse, as a delay and a
+//! lag in series nearly do.
 
 use crate::dimension::Dimension;
 use crate::effects::effect::{Coordinate, Effect, FitContext, Location, Quantity};
@@ -24,6 +27,15 @@ fn times_s(data: &Data) -> (f64, f64) {
     let shortest = SHORTEST * data.sample_s;
     (shortest, (LONGEST * REFERENCE_TIME_CONSTANT_S).max(2.0 * shortest))
 }
+
+/// Bounds of a quick part: neither it nor what is left of the slow one reverses the response.
+fn parts(data: &Data) -> [f64; 2] {
+    let share = data.normalisation.share.clamp(0.0, LARGEST_SHARE);
+    [-share, 1.0 - share]
+}
+
+/// Largest nominal share that bounds a quick part.
+const LARGEST_SHARE: f64 = 0.95;
 
 /// Distances of initial points from the nominal share: a predicted gain counts changes towards the point only. One on each side, as the
 /// response is linear in the share: of two with the same predicted gain rounding would choose.
@@ -57,7 +69,8 @@ impl Effect for InstantaneousShare {
     fn coordinates(&self, form: usize, data: &Data) -> Vec<Coordinate> {
         if form == QUICK {
             let (shortest, longest) = times_s(data);
-            return vec![Coordinate::new(-1.0, 1.0), Coordinate::log(shortest, longest)];
+            let [low, high] = parts(data);
+            return vec![Coordinate::new(low, high), Coordinate::log(shortest, longest)];
         }
         // A nominal share outside of 0 to 1 has room on both sides, too.
         let far = 2.0 * data.normalisation.share;
@@ -68,7 +81,9 @@ impl Effect for InstantaneousShare {
         if form == QUICK {
             let (shortest, longest) = times_s(context.data);
             let times = [4.0 * shortest, 20.0 * shortest].into_iter().filter(|time| *time < longest);
-            return times.flat_map(|time| [0.1, -0.05].map(|part| vec![part, time.ln()])).collect();
+            let [low, _] = parts(context.data);
+            let initial = || [0.1, 0.5 * low.max(-0.1)].into_iter().filter(|part| *part != 0.0);
+            return times.flat_map(|time| initial().map(move |part| vec![part, time.ln()])).collect();
         }
         let nominal = context.data.normalisation.share;
         INITIAL_CHANGES.map(|change| vec![nominal + change]).into()
