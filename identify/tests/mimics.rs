@@ -161,6 +161,40 @@ fn readings_that_are_cut_off_leave_a_gain_a_gain() {
     assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "voltage-dependent-time-constant"]);
 }
 
+/// Numbers from 0 to 1.
+fn uniform(mut state: u32) -> impl FnMut() -> f64 {
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24)
+    }
+}
+
+/// Voltages of at least so many rows: ramps between random levels in up to `ramp` rows, most of them followed by a rest of up to `rest`.
+fn ramps(rows: usize, [ramp, rest]: [f64; 2], mut uniform: impl FnMut() -> f64) -> Vec<f64> {
+    let mut volts = vec![0.0; 20];
+    while volts.len() < rows + 20 {
+        let (from, to) = (volts[volts.len() - 1], (500.0 * uniform()).round());
+        let rows = 4.0 + ((ramp - 4.0) * uniform() * uniform()).round();
+        volts.extend((1..=rows as usize).map(|row| from + (to - from) * row as f64 / rows));
+        if uniform() < 0.6 {
+            volts.extend(vec![to; (6.0 + (rest - 6.0) * uniform()) as usize]);
+        }
+    }
+    volts
+}
+
+/// The report on readings under a voltage that is linear between rows of `row_s`; those of a row have its number.
+fn report_of_ramps(volts: &[f64], row_s: f64, readings: impl Iterator<Item = f64>) -> Report {
+    let row = |(row, reading): (usize, f64)| Row {
+        line: row + 2,
+        time_s: row_s * row as f64,
+        voltage_v: volts[row],
+        measured: Some(reading),
+    };
+    let record = Record { name: String::new(), rows: readings.enumerate().map(row).collect() };
+    diagnose(&record, &Options { input: Input::Linear, ..Options::default() }).unwrap()
+}
+
 /// A share that is negative for a short time makes a response that is late and reverses first, which ramps hardly distinguish from one that
 /// is late and lags.
 #[test]
@@ -168,40 +202,64 @@ fn a_delay_and_a_lag_in_series_are_no_share_that_reverses() {
     const ROW_S: f64 = 0.275;
     const STEPS: usize = 50;
     let late = (0.95 / ROW_S * STEPS as f64).round() as usize;
-    for seed in 1..=3u32 {
-        let mut state = seed;
-        let mut uniform = move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24)
-        };
-        // Ramps between random levels, most of them followed by a rest.
-        let mut volts = vec![0.0; 20];
-        while volts.len() < 900 {
-            let (from, to) = (volts[volts.len() - 1], (500.0 * uniform()).round());
-            let rows = 4.0 + (96.0 * uniform() * uniform()).round();
-            volts.extend((1..=rows as usize).map(|row| from + (to - from) * row as f64 / rows));
-            if uniform() < 0.6 {
-                volts.extend(vec![to; (6.0 + 74.0 * uniform()) as usize]);
-            }
-        }
+    for seed in 1..=3 {
+        let mut uniform = uniform(seed);
+        let volts = ramps(900, [100.0, 80.0], &mut uniform);
         let volts_at = |step: usize| {
             let (row, part) = (step / STEPS, (step % STEPS) as f64 / STEPS as f64);
             volts[row] + part * (volts[row + 1] - volts[row])
         };
         let (mut lag, mut series) = (0.0, 0.0);
-        let rows = (0..850).map(|row| {
-            let noise = 2.0 * (uniform() + uniform() + uniform() - 1.5);
-            let reading = series + noise;
+        let readings = (0..900).map(|row| {
+            let reading = series + 2.0 * (uniform() + uniform() + uniform() - 1.5);
             for step in row * STEPS..(row + 1) * STEPS {
                 let across_v = volts_at(step.saturating_sub(late));
                 lag += (across_v - lag) * ROW_S / STEPS as f64 / PAPER.tau_s;
                 series += (PAPER.share * across_v + (1.0 - PAPER.share) * lag - series) * ROW_S / STEPS as f64 / 0.54;
             }
-            Row { line: row + 2, time_s: ROW_S * row as f64, voltage_v: volts[row], measured: Some(reading) }
+            reading
         });
-        let record = Record { name: String::new(), rows: rows.collect() };
-        let report = diagnose(&record, &Options { input: Input::Linear, ..Options::default() }).unwrap();
+        let report = report_of_ramps(&volts, ROW_S, readings);
         let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
         assert_eq!(causes, ["delay", "series-lag"], "{seed}: {:?}, {:?}", report.verdict, report.findings);
     }
+}
+
+/// The report on a gain of 1.125 with a time constant that changes along the record, of which `tau_s` gives that at a part of it, and a bound
+/// of the sensor.
+fn with_gain_and_bound(seed: u32, tau_s: impl Fn(f64) -> f64) -> Report {
+    const ROW_S: f64 = 0.2;
+    const STEPS: usize = 20;
+    const ROWS: usize = 2400;
+    let mut uniform = uniform(seed);
+    let volts = ramps(ROWS, [130.0, 100.0], &mut uniform);
+    let mut lag = 0.0;
+    let readings = (0..ROWS).map(|row| {
+        let noise = 2.0 * (uniform() + uniform() + uniform() - 1.5);
+        let reading = 1.125 * (PAPER.share * volts[row] + (1.0 - PAPER.share) * lag) + noise;
+        for step in 0..STEPS {
+            let part = (step as f64 + 0.5) / STEPS as f64;
+            let tau_s = tau_s((row as f64 + part) / ROWS as f64);
+            lag +=
+                (volts[row] + part * (volts[row + 1] - volts[row]) - lag) * -f64::exp_m1(-ROW_S / STEPS as f64 / tau_s);
+        }
+        reading.min(472.5)
+    });
+    report_of_ramps(&volts, ROW_S, readings)
+}
+
+/// Rayleigh's law has a slope of its own, which is all that is left of it without a loop.
+#[test]
+fn a_gain_is_no_hysteresis_without_a_loop() {
+    let report = with_gain_and_bound(7, |part| 5.5 + 4.0 * part);
+    let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert_eq!(causes, ["gain-error", "time-constant", "sensor-saturation"], "{:?}", report.findings);
+}
+
+/// The work of this search ends with a curve beside the gain, each of which does what the other may.
+#[test]
+fn a_gain_is_named_where_a_curve_could_replace_it() {
+    let report = with_gain_and_bound(2, |part| 5.5 * (9.5f64 / 5.5).powf(part));
+    let causes: Vec<_> = report.findings.iter().map(|finding| finding.cause).collect();
+    assert_eq!(causes, ["gain-error", "time-constant", "sensor-saturation"], "{:?}", report.findings);
 }

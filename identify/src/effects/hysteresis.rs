@@ -117,6 +117,11 @@ impl Effect for Hysteresis {
         coordinates
     }
 
+    /// Rayleigh's law without plays is a gain.
+    fn nearest_special_case(&self, form: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+        is_rayleigh(form).then(|| ("gain-error", 0, vec![point[0] + point[1]]))
+    }
+
     /// The play behind the relaxation and the friction under load have no initial condition that is estimated: they are not tried where
     /// it is unknown.
     fn initial_points(&self, form: usize, FitContext { data, .. }: &FitContext) -> Vec<Vec<f64>> {

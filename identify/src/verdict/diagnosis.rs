@@ -238,9 +238,24 @@ fn findings(engine: &mut Engine, found: &Found) -> Vec<Finding> {
     let (data, observed, fit) = (engine.data, engine.observed, &found.best.fit);
     let mut findings: Vec<Finding> = found.causes.iter().map(|cause| finding(engine, found, cause)).collect();
     let isolated = adequacy::spikes(engine, fit).is_none();
-    findings.extend(reading_findings(data, observed, fit, isolated));
+    for mut shown in reading_findings(data, observed, fit, isolated) {
+        take_over(&mut shown, &mut findings);
+        findings.push(shown);
+    }
     findings.sort_by(|a, b| explained(b).total_cmp(&explained(a)));
     findings
+}
+
+/// Removes the finding of the same cause that the search made, such as the knee of a bound that the readings prove, and takes over those
+/// of its parameters that are missing.
+fn take_over(shown: &mut Finding, searched: &mut Vec<Finding>) {
+    if let Some(place) = searched.iter().position(|finding| finding.cause == shown.cause && !finding.proved) {
+        for (name, parameter) in searched.remove(place).parameters {
+            if shown.parameters.iter().all(|(known, _)| *known != name) {
+                shown.parameters.push((name, parameter));
+            }
+        }
+    }
 }
 
 /// The verdict, by the first that applies: unexplained structure, alternatives, margins too wide, no findings.
@@ -282,5 +297,40 @@ fn unidentified(engine: &Engine, baseline: Fit, reason: &Unidentifiable) -> Diag
         contenders: Vec::new(),
         unexplained_v: 0.0,
         warm_start: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::answer::Parameter;
+    use crate::dimension::Dimension;
+
+    #[test]
+    fn a_bound_that_the_readings_prove_takes_over_the_knee_that_the_search_found() {
+        let of = |names: &[(&str, f64)], proved| Finding {
+            cause: "sensor-saturation",
+            probability: if proved { 1.0 } else { 0.4 },
+            parameters: names.iter().map(|(name, value)| ((*name).to_owned(), parameter(*value))).collect(),
+            rmse_before: 2.0,
+            rmse_after: 1.0,
+            evidence: String::new(),
+            proved,
+        };
+        let mut searched = vec![of(&[("limit", 399.0), ("knee", 7.0)], false)];
+        let mut shown = of(&[("limit", 400.0)], true);
+        take_over(&mut shown, &mut searched);
+        let values: Vec<_> = shown.parameters.iter().map(|(name, it)| (name.as_str(), it.value)).collect();
+        assert!(searched.is_empty() && values == [("limit", 400.0), ("knee", 7.0)], "{values:?}");
+        // The other bound is a finding of its own.
+        let mut both = vec![shown];
+        take_over(&mut of(&[("limit", 20.0)], true), &mut both);
+        assert_eq!(both.len(), 1);
+    }
+
+    fn parameter(value: f64) -> Parameter {
+        let [low, high] = [value - 1.0, value + 1.0];
+        let (dimension, unit) = (Dimension::Reading, String::new());
+        Parameter { value, low, high, unit, at_bound: false, extrapolated_from_v: None, dimension }
     }
 }

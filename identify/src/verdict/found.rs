@@ -82,10 +82,23 @@ pub(crate) fn search(
     if let Some(reason) = adequacy::unidentifiable(search.evaluator(), &candidate, When::AfterSearch) {
         return Err(reason);
     }
-    // The rivals before further structures are evaluated for comparison, the contenders after.
-    let rivals = rivals(&search, &best);
-    let effects = effects(&best.fit.model);
-    let left_out: Vec<Scored> = effects.iter().map(|&effect| search.left_out(&best, effect)).collect();
+    let (rivals, effects, left_out) = loop {
+        // The rivals before further structures are evaluated for comparison, the contenders after.
+        let rivals = rivals(&search, &best);
+        let effects = effects(&best.fit.model);
+        let left_out: Vec<Scored> = effects.iter().map(|&effect| search.left_out(&best, effect)).collect();
+        // A search that was cut off has not compared all of them with the best. An effect that nothing needs would hide another one.
+        match left_out.iter().filter(|without| without.score >= best.score).max_by(|a, b| a.score.total_cmp(&b.score)) {
+            Some(without) if effects.len() > 1 => {
+                let [with, without_it] = [&best, without].map(|of| held_out(search.evaluator(), &of.fit));
+                if without_it > AS_GOOD * with {
+                    break (rivals, effects, left_out);
+                }
+                best = without.clone();
+            }
+            _ => break (rivals, effects, left_out),
+        }
+    };
     // The best without a cause is chosen after all were evaluated, so that sentence and ranking name the same.
     let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
     let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
