@@ -141,7 +141,9 @@ fn with_zero_shifts(records: &[Record], mut identified: Identified, mut models: 
     for _ in 0..zero_shifts::MOST_SEARCHES {
         let (spring, before) = latest.as_ref().map_or((&identified, &models), |latest| (&latest.0, &latest.1));
         let delay = spring.report.nominal.delay_s.value;
-        let further: Vec<Vec<f64>> = spring.records.iter().map(|course| zero_shifts::steps(course, delay)).collect();
+        let shortest = zero_shifts::shortest_stretch(&spring.report.oscillation);
+        let steps = |course| zero_shifts::steps(course, delay, shortest);
+        let further: Vec<Vec<f64>> = spring.records.iter().map(steps).collect();
         if further.iter().all(Vec::is_empty) {
             break;
         }

@@ -503,6 +503,45 @@ fn records_without_information_are_rejected_in_one_line() {
     }
 }
 
+/// An oscillator whose spring hardens with `cubic`, under a multisine that grows, by classical Runge-Kutta steps.
+fn hardening(cubic: f64, phase: f64) -> Record {
+    const SUBSTEPS: usize = 8;
+    let (rows, interval) = (2000, 1.0 / 610.0);
+    let (omega, step) = (TAU * 69.0, interval / SUBSTEPS as f64);
+    let mut state = [0.0_f64; 2];
+    let mut row = |row: usize| {
+        let time_s = row as f64 * interval;
+        let wave = |line: usize| f64::cos(TAU * (5 + 3 * line) as f64 * time_s + phase * (line * line) as f64);
+        let voltage_v = 0.5 * row as f64 / rows as f64 * (0..65).map(wave).sum::<f64>() / 32.5_f64.sqrt();
+        let measured = Some(state[0] + 0.006 * (((row * 7919) % 101) as f64 / 101.0 - 0.5));
+        let rate = |[x, v]: [f64; 2]| [v, omega * omega * (voltage_v - x - cubic * x.powi(3)) - 0.1 * omega * v];
+        for _ in 0..SUBSTEPS {
+            let along = |rate: [f64; 2], by: f64| [state[0] + by * rate[0], state[1] + by * rate[1]];
+            let first = rate(state);
+            let second = rate(along(first, 0.5 * step));
+            let third = rate(along(second, 0.5 * step));
+            let fourth = rate(along(third, step));
+            state = [0, 1].map(|of| state[of] + step / 6.0 * (first[of] + 2.0 * (second[of] + third[of]) + fourth[of]));
+        }
+        Row { line: 0, time_s, voltage_v, measured }
+    };
+    Record { name: "oscillator".into(), rows: (0..rows).map(&mut row).collect() }
+}
+
+/// The largest half waves of what the linear model leaves are no shifts of the zero.
+#[test]
+fn half_waves_of_an_oscillation_are_no_shifts() {
+    for (cubic, phase) in [(0.03, 3.1), (0.1, 5.3)] {
+        let report = found(&[hardening(cubic, phase)]).report;
+        assert_eq!(report.oscillation.len(), 1);
+        assert!(report.zero_shifts.is_empty(), "{cubic}: {:?}", report.zero_shifts);
+    }
+    let mut shifted = hardening(0.03, 5.3);
+    shifted.rows[700..900].iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + 0.5));
+    let by: Vec<f64> = found(&[shifted]).report.zero_shifts.iter().map(|shift| shift.by).collect();
+    assert!(by.len() == 2 && by.iter().all(|by| (by.abs() - 0.5).abs() < 0.02), "{by:?}");
+}
+
 /// A square-root law under steps of one period of a sine, after a rest: no linear model describes it, and free responses would follow
 /// the law.
 #[test]

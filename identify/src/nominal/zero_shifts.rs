@@ -10,6 +10,7 @@ use crate::nominal::far_readings::after_changes;
 use crate::nominal::identified::Course;
 use crate::nominal::intervals::directions;
 use crate::nominal::models::{Models, effective_rows};
+use crate::nominal::report::Oscillation;
 use crate::stats::median::{median, robust_deviation};
 use crate::stats::scale::{root_mean_square, second_differences};
 use crate::stats::shifted_run::shifted_runs;
@@ -28,9 +29,20 @@ const NEXT_TO: usize = 5;
 const ABRUPT: f64 = 2.0;
 /// The lower edge of a stretch is one if it is so large relative to the higher one.
 const OTHER_EDGE: f64 = 0.5;
+/// Largest damping ratio of an oscillation that the errors of a spring that is not linear follow.
+const RINGING: f64 = 0.3;
+/// Periods of such an oscillation that a stretch lasts at least: a shorter one may be one of its half waves.
+const SHORTEST_STRETCH: f64 = 3.0;
 
-/// Returns the times between readings at which the errors of a record step, in s; none if they do not, or as the voltage changes.
-pub(super) fn steps(course: &Course, delay: f64) -> Vec<f64> {
+/// The shortest time that a stretch of shifted readings lasts, in s, beside a spring's oscillations.
+pub(super) fn shortest_stretch(oscillations: &[Oscillation]) -> f64 {
+    let ringing = oscillations.iter().filter(|oscillation| oscillation.zeta.value < RINGING);
+    ringing.map(|oscillation| SHORTEST_STRETCH / oscillation.freq_hz.value).fold(0.0, f64::max)
+}
+
+/// Returns the times between readings at which the errors of a record step, in s; none if they do not, or as the voltage changes, or for
+/// a shorter stretch than the shortest.
+pub(super) fn steps(course: &Course, delay: f64, shortest: f64) -> Vec<f64> {
     let usual = robust_deviation(course.residual.iter().copied()).unwrap_or(0.0);
     let [by_level, by_edges] = shifted_runs(&course.residual, usual);
     let Some(run) = by_edges.or(by_level) else { return Vec::new() };
@@ -49,7 +61,11 @@ pub(super) fn steps(course: &Course, delay: f64) -> Vec<f64> {
     if edges.iter().any(|&edge| after[edge]) {
         return Vec::new();
     }
-    edges.into_iter().map(|edge| 0.5 * (course.time_s[edge - 1] + course.time_s[edge])).collect()
+    let times: Vec<f64> = edges.into_iter().map(|edge| 0.5 * (course.time_s[edge - 1] + course.time_s[edge])).collect();
+    match times[..] {
+        [from, to] if to - from < shortest => Vec::new(),
+        _ => times,
+    }
 }
 
 /// Difference of the median errors next to an edge.
