@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let spring_error = errors_with_small_shares("--spring-error", given, identified, LARGEST)?;
     let file = plant::load(&arguments.plant)?;
     let amplifier = file.behind(Amplifier { slew_v_per_s, ..Amplifier::up_to(limit_v) });
-    plant::remark_on_stair(&arguments.plant, &file, amplifier);
+    plant::remark_on_stair(&arguments.plant, &file, &[amplifier]);
     let allowed = Allowed { amplifier, overshoot: overshoot_percent / 100.0 };
     let answer =
         answer(&file, &Question { allowed, spring_error, within_s }).map_err(|error| named(error, SETTINGS))?;

@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant::load(&arguments.plant)?;
     let behind = |&limit_v: &f64| Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(limit_v) };
     let amplifiers: Vec<Amplifier> = arguments.limit_v.iter().map(behind).collect();
-    amplifiers.iter().take(1).for_each(|&amplifier| plant::remark_on_stair(&arguments.plant, &file, amplifier));
+    plant::remark_on_stair(&arguments.plant, &file, &amplifiers);
     let actual = arguments.actual()?;
     let margin = arguments.known.margin()?;
     let comparison = compare(&file, arguments.rate_hz, &amplifiers, actual.as_ref(), margin)

@@ -46,10 +46,11 @@ pub(crate) fn remark_on(name: &str, file: &PlantFile) {
     }
 }
 
-/// Remarks on a stair whose steps are not those of the report because the spring's own range is too small for them.
-pub(crate) fn remark_on_stair(name: &str, file: &PlantFile, amplifier: Amplifier) {
-    let step_v = file.stair_step_v(amplifier);
-    if step_v != STAIR_STEP_V {
+/// Remarks on stairs whose steps are not those of the report because the spring's own range behind an amplifier is too small for them.
+pub(crate) fn remark_on_stair(name: &str, file: &PlantFile, amplifiers: &[Amplifier]) {
+    let mut steps_v: Vec<f64> = amplifiers.iter().map(|amplifier| file.stair_step_v(*amplifier)).collect();
+    steps_v.dedup();
+    for step_v in steps_v.into_iter().filter(|step_v| *step_v != STAIR_STEP_V) {
         let unit = file.units.as_ref().and_then(|units| units.other_command()).unwrap_or("V");
         let [step, end] = [step_v, 5.0 * step_v].map(number);
         remark(&format!(

@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let request = arguments.request(options, &file, target);
     request.check().map_err(|error| named(error, SETTINGS))?;
     if record.is_none() {
-        plant::remark_on_stair(&arguments.control.plant, &file, request.amplifier);
+        plant::remark_on_stair(&arguments.control.plant, &file, &[request.amplifier]);
     }
     let answer = request.run(|done, all| {
         bar.set_length(all as u64);

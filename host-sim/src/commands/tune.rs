@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<()> {
     let file = plant::load(&arguments.plant)?;
     let amplifier =
         file.behind(Amplifier { slew_v_per_s: arguments.slew_v_per_s, ..Amplifier::up_to(arguments.limit_v) });
-    plant::remark_on_stair(&arguments.plant, &file, amplifier);
+    plant::remark_on_stair(&arguments.plant, &file, &[amplifier]);
     let knowledge = arguments.knowledge()?;
     let specification =
         Specification { file: &file, amplifier, rate_hz: arguments.rate_hz, overshoot_percent, knowledge };

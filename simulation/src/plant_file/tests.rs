@@ -182,3 +182,27 @@ fn a_law_of_many_points_runs_on_nine_that_follow_it() {
     assert!(error.contains(expected), "{error}");
     assert!(parse_for_host("p", &waves).is_ok());
 }
+
+#[test]
+fn steps_of_the_stair_follow_the_range_of_the_spring() {
+    let step = |more: &str, amplifier_v: f64| {
+        let file = parse("p", &format!("schema = 1\n{more}\n[relaxation]\nshare = 0.1\ntau_s = 1\n")).unwrap();
+        file.stair_step_v(model::Amplifier::up_to(amplifier_v))
+    };
+    let law = |end: f64| format!("[law]\nvoltage_v = [0, {end}]\nstiffness = [0, {end}]");
+    for (more, amplifier_v, expected) in [
+        ("", 700.0, 100.0),
+        // A range that is only an option's is refused.
+        ("", 400.0, 100.0),
+        ("[amplifier]\nlimit_v = 500", 700.0, 100.0),
+        ("[amplifier]\nlimit_v = 430", 700.0, 50.0),
+        ("[units]\nvoltage = \"%\"", 700.0, 100.0),
+        ("[units]\nvoltage = \"%\"", 100.0, 10.0),
+        ("[units]\nvoltage = \"%\"\n[amplifier]\nlimit_v = 70", 100.0, 10.0),
+        (&law(480.0), 700.0, 100.0),
+        (&law(240.0), 700.0, 20.0),
+        (&law(5.0), 700.0, 0.5),
+    ] {
+        assert!((step(more, amplifier_v) / expected - 1.0).abs() < 1e-12, "{more} {}", step(more, amplifier_v));
+    }
+}
