@@ -10,6 +10,10 @@
 //! A command that follows the last reading makes `w(t + 1)` follow `e(t)`, a later one a `w` after that. One that follows the reading of
 //! its own row makes `v(t)` follow `e(t)` against the sign of the gain; with its sign an instantaneous response does. (Söderström and Ljung, *Automatica* 13, 1977, on
 //! detecting feedback.)
+//!
+//! Noise is new in every row, and so is the command that follows it. Where `w` still follows itself from row to row, the command is smooth
+//! and the prediction short: such a remainder of fixed sines follows every error of the simulation, that is smooth as well, and shows no
+//! feedback.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,6 +23,8 @@ use crate::stats::rank::rank_correlation;
 const ORDER: usize = 4;
 /// Smallest rank correlation that shows a feedback: in the fewest rows chance reaches it once in a million.
 const LEAST_CORRELATION: f64 = 0.3;
+/// Largest rank correlation of what is new in the command with itself some rows later: more than a quarter of it is then old.
+const MOST_OLD: f64 = 0.5;
 /// Smallest number of rows in which a feedback is looked for.
 const FEWEST_ROWS: usize = 300;
 /// Largest number of rows after which a command follows a reading.
@@ -45,6 +51,10 @@ pub(crate) fn is_in_feedback(command: &[f64], reading: &[f64]) -> bool {
     let [new, both] = unpredicted([y, u], &[y, u]);
     let [own] = unpredicted([u], &[u]);
     let correlation = |one: &[f64], other: &[f64]| rank_correlation(one, other) / (one.len() as f64 - 1.0).sqrt();
+    let is_old = |late: usize| correlation(&own[..own.len() - late], &own[late..]).abs() > MOST_OLD;
+    if (1..=ORDER).any(is_old) {
+        return false;
+    }
     let follows = |late: usize| correlation(&new[..new.len() - late], &own[late..]).abs() > LEAST_CORRELATION;
     (1..=LATEST).any(follows) || correlation(&new, &both) < -LEAST_CORRELATION
 }
@@ -132,6 +142,25 @@ mod tests {
                     assert!(!is_found(&record), "{what}, share {share}, noise {noise}");
                 }
             }
+        }
+    }
+
+    /// The rows before predict a second response and a curve in part only: what is left is as smooth as the command.
+    #[test]
+    fn smooth_sines_beside_a_smooth_error_are_no_feedback() {
+        let angles = [0.022, 0.046, 0.074, 0.106, 0.158, 0.226, 0.298, 0.374, 0.446, 0.52];
+        let command = |row: usize| {
+            let sines = angles.iter().enumerate().map(|(k, angle)| (angle * row as f64 + 1.7 * (k * k) as f64).sin());
+            100.0 + 20.0 * sines.sum::<f64>()
+        };
+        for (part, curved, noise) in [(0.0, 0.0, 0.02), (0.6, 0.0, 0.0), (0.6, 0.0, 0.02), (0.3, 1.0, 0.02)] {
+            let (u, mut y) = record(0.1, noise, |row, _| command(row));
+            let mut second = 0.0;
+            for (y, u) in y.iter_mut().zip(&u) {
+                second += 0.3 * (u - second);
+                *y += part * second + curved * y.max(0.0).sqrt();
+            }
+            assert!(!is_in_feedback(&u, &y), "{part} {curved} {noise}");
         }
     }
 
