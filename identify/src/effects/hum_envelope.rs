@@ -25,6 +25,9 @@ const PARTS: usize = 64;
 /// Number of times that both ends are then moved to their best row.
 const ROUNDS: usize = 2;
 
+/// Smallest determinant of cosine and sine in some rows, relative to the square of their sum, with which both are determined.
+const LEAST_INDEPENDENT: f64 = 1e-9;
+
 /// Weights of consecutive amplitudes in one row, and the number of the first of these.
 pub(super) type Weights<const W: usize> = (usize, [f64; W]);
 
@@ -99,23 +102,67 @@ pub(super) struct Stretch {
     pub(super) amplitudes: [f64; 2],
 }
 
-/// Returns the stretch in which a sine of a frequency reduces the squared residual most, with sine and cosine taken as orthogonal; rows
-/// that are NaN do not count. `None` if it is too short, or the whole record.
+/// Sums over rows of a residual with the cosine and the sine, and of the squares of these and their product.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    with: [f64; 2],
+    squares: [f64; 2],
+    product: f64,
+}
+
+impl Sums {
+    /// Sums with one row more; one that is NaN adds nothing.
+    fn and(mut self, left: f64, turn: [f64; 2]) -> Self {
+        if left.is_nan() {
+            return self;
+        }
+        for (k, of) in turn.into_iter().enumerate() {
+            self.with[k] += left * of;
+            self.squares[k] += of * of;
+        }
+        self.product += turn[0] * turn[1];
+        self
+    }
+
+    /// Sums over the rows after those of others.
+    fn after(self, before: Self) -> Self {
+        let less = |k: usize| (self.with[k] - before.with[k], self.squares[k] - before.squares[k]);
+        let [cosine, sine] = [less(0), less(1)];
+        Self { with: [cosine.0, sine.0], squares: [cosine.1, sine.1], product: self.product - before.product }
+    }
+
+    /// The amplitudes of cosine and sine that reduce the squared residual most, by least squares: near an end of a stretch a row counts by
+    /// what the sine is there, not by its mean square.
+    fn amplitudes(&self) -> [f64; 2] {
+        let ([cosine, sine], [of_cosine, of_sine]) = (self.with, self.squares);
+        let sum = of_cosine + of_sine;
+        let determinant = of_cosine * of_sine - self.product * self.product;
+        if determinant > LEAST_INDEPENDENT * sum * sum {
+            [of_sine * cosine - self.product * sine, of_cosine * sine - self.product * cosine]
+                .map(|of| of / determinant)
+        } else {
+            self.with.map(|of| of / sum.max(f64::MIN_POSITIVE))
+        }
+    }
+
+    /// Reduction of the squared residual, in V^2.
+    fn gain(&self) -> f64 {
+        dot(&self.amplitudes(), &self.with)
+    }
+}
+
+/// Returns the stretch in which a sine of a frequency reduces the squared residual most; rows that are NaN do not count. `None` if it is
+/// too short, or the whole record.
 pub(super) fn stretch(residual: &[f64], data: &Data, frequency_hz: f64) -> Option<Stretch> {
-    let mut sums = vec![(0.0, 0.0)];
-    let (mut cosine, mut sine) = (0.0, 0.0);
+    let mut sums = vec![Sums::default()];
     for (left, (sin, cos)) in residual.iter().zip(spectrum::oscillation(frequency_hz, data)) {
-        let left = if left.is_nan() { 0.0 } else { *left };
-        (cosine, sine) = (cosine + left * cos, sine + left * sin);
-        sums.push((cosine, sine));
+        sums.push(sums[sums.len() - 1].and(*left, [cos, sin]));
     }
     let rows = residual.len();
     let fewest = (FEWEST_PERIODS / (frequency_hz * data.sample_s)).ceil() as usize;
-    let over = |from: usize, to: usize| [sums[to].0 - sums[from].0, sums[to].1 - sums[from].1];
-    let gain = |&(from, to): &(usize, usize)| {
-        let of = over(from, to);
-        if to < from + fewest { f64::NEG_INFINITY } else { dot(&of, &of) / (to - from) as f64 }
-    };
+    let over = |from: usize, to: usize| sums[to].after(sums[from]);
+    let gain =
+        |&(from, to): &(usize, usize)| if to < from + fewest { f64::NEG_INFINITY } else { over(from, to).gain() };
     let best = |ends: &mut dyn Iterator<Item = (usize, usize)>| ends.max_by(|a, b| gain(a).total_cmp(&gain(b)));
     let cut = |part: usize| part * rows / PARTS;
     let mut coarse = (0..PARTS).flat_map(|from| (from + 1..=PARTS).map(move |to| (cut(from), cut(to))));
@@ -126,7 +173,42 @@ pub(super) fn stretch(residual: &[f64], data: &Data, frequency_hz: f64) -> Optio
         found = best(&mut near(found.1).map(|to| (found.0, to)).filter(|(from, to)| from < to))?;
     }
     let (from, to) = found;
-    let half = (to - from) as f64 / 2.0;
     let whole = (from, to) == (0, rows);
-    (gain(&found) > 0.0 && !whole).then(|| Stretch { rows: from..to, amplitudes: over(from, to).map(|sum| sum / half) })
+    (gain(&found) > 0.0 && !whole).then(|| Stretch { rows: from..to, amplitudes: over(from, to).amplitudes() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    /// Rows at the ends where the sine is small are its rows as well, and those at its peaks are none beyond the ends.
+    #[test]
+    fn the_ends_of_a_stretch_are_found_to_the_row_whatever_the_phase() {
+        let rows = 500;
+        let row = |row: usize| Row { line: 0, time_s: 0.01 * row as f64, voltage_v: 0.0, measured: Some(0.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..rows).map(row).collect() }, Input::Hold);
+        for (frequency_hz, stretched) in [(16.1, 130..410), (6.3, 51..300), (23.0, 200..260), (11.7, 240..447)] {
+            for tenth in 0..10 {
+                let (sine, cosine) = (0.628 * f64::from(tenth)).sin_cos();
+                let mut residual = vec![0.0; rows];
+                for (row, (sin, cos)) in spectrum::oscillation(frequency_hz, &data).enumerate() {
+                    if stretched.contains(&row) {
+                        residual[row] = cosine * cos + sine * sin;
+                    }
+                }
+                let found = stretch(&residual, &data, frequency_hz).unwrap();
+                // A row without a sine is on either side.
+                let with = |rows: Range<usize>| {
+                    let is_in = |row: &usize| residual[*row].abs() > 1e-3;
+                    (rows.clone().find(is_in), rows.rev().find(is_in))
+                };
+                assert_eq!(with(found.rows.clone()), with(stretched.clone()), "{frequency_hz} {tenth}");
+                assert!(found.rows.len() <= stretched.len() + 2, "{frequency_hz} {tenth}: {:?}", found.rows);
+                assert!((found.amplitudes[0] - cosine).abs() < 0.01, "{frequency_hz} {tenth}");
+                assert!((found.amplitudes[1] - sine).abs() < 0.01, "{frequency_hz} {tenth}");
+            }
+        }
+    }
 }
