@@ -98,7 +98,7 @@ impl Effect for AmplifierSlew {
     }
 
     /// An amplifier that reaches its rate in no step but the largest is a lag.
-    fn is_another_cause(&self, form: usize, point: &[f64], data: &Data) -> bool {
+    fn is_another_cause(&self, form: usize, point: &[f64], data: &Data, _: f64) -> bool {
         form == WITH_TIME_CONSTANT && (point[0] + point[1]).exp() > LARGEST_LAG * stroke(data)
     }
 

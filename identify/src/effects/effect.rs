@@ -188,8 +188,9 @@ pub trait Effect: Sync {
         &[]
     }
 
-    /// Returns true at a point where the effect cannot be distinguished from another cause, whose name it must not take.
-    fn is_another_cause(&self, _form: usize, _point: &[f64], _data: &Data) -> bool {
+    /// Returns true at a point where the effect cannot be distinguished from another cause, whose name it must not take, in readings with
+    /// noise of the scale `sigma_v`.
+    fn is_another_cause(&self, _form: usize, _point: &[f64], _data: &Data, _sigma_v: f64) -> bool {
         false
     }
 

@@ -23,6 +23,8 @@ use crate::plant::chain::Chain;
 use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
 use crate::record::data::Data;
+use crate::stats::sums::dot;
+use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 
 pub(super) struct Hysteresis;
 
@@ -146,6 +148,20 @@ impl Effect for Hysteresis {
         parts.iter().map(|&part| start(part, 0.4)).collect()
     }
 
+    /// Plays that stand still, as one whose threshold is half the largest voltage does on the descending branch, or move by less than the
+    /// noise of all rows shows, leave no loop but a gain.
+    fn is_another_cause(&self, form: usize, point: &[f64], data: &Data, sigma_v: f64) -> bool {
+        if matches!(form, BEHIND | LOAD) {
+            return false;
+        }
+        let (voltages, mut bank) = (&data.voltage_v, bank(form, point, data.full_scale_v));
+        let outputs: Vec<f64> = voltages.iter().map(|voltage| bank.at(*voltage)).collect();
+        let gain = dot(&outputs, voltages) / dot(voltages, voltages);
+        let of_loop: f64 =
+            outputs.iter().zip(voltages).map(|(output, voltage)| (output - gain * voltage).powi(2)).sum();
+        0.5 * of_loop < NATS_WITHIN_INTERVAL * sigma_v * sigma_v
+    }
+
     fn quantities(&self, form: usize, point: &[f64], data: &Data) -> Vec<Quantity> {
         let width = match form {
             LOAD => LoadFriction::new(point[0]).width(data.full_scale_v),
@@ -170,5 +186,30 @@ impl Effect for Hysteresis {
             return;
         }
         chain.memory = bank(form, point, data.full_scale_v).composed_with(&chain.memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::input::Input;
+    use simulation::record::{Record, Row};
+
+    #[test]
+    fn plays_that_stand_still_are_a_gain_and_no_hysteresis() {
+        let voltage_v = |row: usize| [0.0, 120.0, 500.0, 60.0, 333.0, 480.0, 20.0, 250.0][row / 25 % 8];
+        let row = |row| Row { line: 0, time_s: 0.1 * row as f64, voltage_v: voltage_v(row), measured: Some(0.0) };
+        let data = Data::new(&Record { name: String::new(), rows: (0..800).map(row).collect() }, Input::Hold);
+        let is_gain = |form: usize, point: &[f64]| Hysteresis.is_another_cause(form, point, &data, 0.7);
+        const CYCLED_PART: usize = 3;
+        const PART: usize = 1;
+        let half = (0.5 * data.full_scale_v).ln();
+        assert!(is_gain(CYCLED_PART, &[half, 0.22]));
+        assert!(is_gain(RAYLEIGH, &[0.78, 1e-6]) && is_gain(CYCLED_RAYLEIGH, &[0.78, 0.0]));
+        // From rest a play of that threshold does follow.
+        assert!(!is_gain(PART, &[half, 0.22]));
+        assert!(!is_gain(CYCLED_PART, &[half - 0.1, 0.22]));
+        assert!(!is_gain(WHOLE, &[3f64.ln()]) && !is_gain(RAYLEIGH, &[0.78, 0.02]));
+        assert!(!is_gain(BEHIND, &[3f64.ln()]) && !is_gain(LOAD, &[0.02]));
     }
 }

@@ -96,7 +96,7 @@ impl Effect for Resonance {
     }
 
     /// What is as damped as that overshoots no more than two lags do.
-    fn is_another_cause(&self, _: usize, point: &[f64], _: &Data) -> bool {
+    fn is_another_cause(&self, _: usize, point: &[f64], _: &Data, _: f64) -> bool {
         point[1] >= MOST_DAMPED.get().ln() - AT_BOUND
     }
 

@@ -84,7 +84,7 @@ impl Effect for SecondRelaxation {
     }
 
     /// Creep that is added with about the time constant of the response changes its gain.
-    fn is_another_cause(&self, form: usize, point: &[f64], _: &Data) -> bool {
+    fn is_another_cause(&self, form: usize, point: &[f64], _: &Data, _: f64) -> bool {
         form == ADDED && point[1].exp() < LEAST_APART * REFERENCE_TIME_CONSTANT_S
     }
 
@@ -173,7 +173,7 @@ mod tests {
         let row = |row: usize| Row { line: row, time_s: row as f64, voltage_v: 0.0, measured: Some(0.0) };
         let data = Data::new(&Record { name: String::new(), rows: (0..200).map(row).collect() }, Input::Hold);
         let is_gain = |form: usize, times: f64| {
-            SecondRelaxation.is_another_cause(form, &[0.2, (times * REFERENCE_TIME_CONSTANT_S).ln()], &data)
+            SecondRelaxation.is_another_cause(form, &[0.2, (times * REFERENCE_TIME_CONSTANT_S).ln()], &data, 1.0)
         };
         assert!(is_gain(ADDED, 1.26) && !is_gain(ADDED, 1.6) && !is_gain(OF_EVERYTHING, 1.26));
     }

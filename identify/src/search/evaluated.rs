@@ -39,7 +39,8 @@ impl Evaluated {
 
     /// Score of a fit whose held-out log-likelihood is known, in nats; minus infinity if one of its blocks is another cause.
     fn score(&self, evaluator: &impl Evaluator, fit: &Fit, held_out: f64) -> f64 {
-        if fit.model.blocks.iter().any(|(block, point)| evaluator.is_another_cause(block, point)) {
+        let sigma_v = fit.noise.sigma;
+        if fit.model.blocks.iter().any(|(block, point)| evaluator.is_another_cause(block, point, sigma_v)) {
             return f64::NEG_INFINITY;
         }
         held_out - self.price(evaluator, fit)

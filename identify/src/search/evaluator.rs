@@ -83,8 +83,9 @@ pub trait Evaluator {
         block.effect().location()
     }
 
-    /// True if a block at a point cannot be distinguished from another cause, whose name it must not take.
-    fn is_another_cause(&self, _block: &Block, _point: &[f64]) -> bool {
+    /// True if a block at a point cannot be distinguished from another cause, whose name it must not take, in readings with noise of the
+    /// scale `sigma_v`.
+    fn is_another_cause(&self, _block: &Block, _point: &[f64], _sigma_v: f64) -> bool {
         false
     }
 
@@ -193,8 +194,8 @@ impl Evaluator for Engine<'_> {
         block.effect().location_at(block.form, point, self.data)
     }
 
-    fn is_another_cause(&self, block: &Block, point: &[f64]) -> bool {
-        block.effect().is_another_cause(block.form, point, self.data)
+    fn is_another_cause(&self, block: &Block, point: &[f64], sigma_v: f64) -> bool {
+        block.effect().is_another_cause(block.form, point, self.data, sigma_v)
     }
 
     fn misfit(&self, fit: &Fit, times: f64, floor_v: f64) -> f64 {

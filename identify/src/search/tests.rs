@@ -81,7 +81,7 @@ impl Evaluator for Tabulated {
         }
     }
 
-    fn is_another_cause(&self, block: &Block, _: &[f64]) -> bool {
+    fn is_another_cause(&self, block: &Block, _: &[f64], _: f64) -> bool {
         self.another == Some(block.effect)
     }
 
