@@ -247,6 +247,11 @@ impl Effect for StaticNonlinearity {
                 if coefficients > 1 && place != Within {
                     starts.extend([s(0.1), s(-0.1)]);
                 }
+                if place == Within {
+                    // A force that stiffens or softens on both sides bends with the square; the steps of a linearisation from a weak
+                    // bend do not reach a strong one.
+                    starts.extend([start(&[0.0, 0.3]), start(&[0.0, -0.1])]);
+                }
                 starts
             }
         }
