@@ -27,6 +27,7 @@
 //! | `first_fits` | first fits of a structure's extensions |
 //! | `evaluated` | all structures evaluated so far, and the prices |
 //! | `structure_search` | the search |
+//! | `rival_forms` | the other forms of what comes close to the best structure |
 //! | `extend` | a structure's extensions: which are fitted, and which of those are evaluated |
 //! | `predicting` | the structure that a search ends with, by held-out error where the likeliest does not predict |
 //! | `explored` | what a search has evaluated, for questions of the report |
@@ -40,6 +41,7 @@ mod initial_models;
 mod penalty_factor;
 mod predicted_gain;
 mod predicting;
+mod rival_forms;
 mod scored;
 mod structure_search;
 #[cfg(test)]

@@ -84,7 +84,8 @@ impl<'e, E: Evaluator> Search<'e, E> {
             {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 let best = self.repriced(&best, &mut progress);
-                return self.with_rare_forms(best, &mut progress);
+                let best = self.with_rare_forms(best, &mut progress);
+                return self.with_rivals_reformed(best, &mut progress);
             }
             self.extended.clear();
             self.evaluated.reprice(self.evaluator, penalty_factor);
@@ -336,7 +337,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
 
     /// Fits each block again in every form and from every start, the others kept at their parameters: the form and the start
     /// that were found first may have stood in for a block that was found later.
-    fn reformed(&mut self, mut scored: Scored) -> Scored {
+    pub(super) fn reformed(&mut self, mut scored: Scored) -> Scored {
         let alone = scored.fit.model.blocks.len() == 1;
         for effect in effects(&scored.fit.model) {
             if alone && EFFECTS[effect].forms() < 2 || self.evaluator.is_over() {
@@ -354,7 +355,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// Removes blocks, or replaces them by simpler ones, while that raises the score.
-    fn pruned(&mut self, mut scored: Scored) -> Scored {
+    pub(super) fn pruned(&mut self, mut scored: Scored) -> Scored {
         loop {
             if self.evaluator.is_over() {
                 return scored;

@@ -26,6 +26,8 @@ struct Tabulated {
     hidden: Option<usize>,
     /// Effect that also has a form that is seldom needed, and the log-likelihood of every set with it.
     rare: Option<(usize, f64)>,
+    /// Effect that has a better form beside another, in this order, and the log-likelihood of both with that form.
+    other_form: Option<(usize, usize, f64)>,
     /// Effect that cannot be distinguished from another cause.
     another: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
@@ -48,6 +50,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         clean: f64::INFINITY,
         hidden: None,
         rare: None,
+        other_form: None,
         another: None,
         fits: 0,
         most_fits: isize::MAX,
@@ -69,6 +72,9 @@ impl Evaluator for Tabulated {
         let is_rare = |effect| model.blocks.iter().any(|(block, _)| *block == rare_form(effect));
         let of_rare = self.rare.filter(|(effect, _)| is_rare(*effect)).map(|(_, worth)| worth);
         let log_likelihood = of_rare.map_or(log_likelihood, |worth| log_likelihood.max(worth));
+        let is_other = |(effect, beside, _): &(usize, usize, f64)| has.contains(beside) && is_rare(*effect);
+        let of_other = self.other_form.filter(is_other).map(|(_, _, worth)| worth);
+        let log_likelihood = of_other.map_or(log_likelihood, |worth| log_likelihood.max(worth));
         let mut noise = Noise::default_robust();
         noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
         Fit {
@@ -111,7 +117,9 @@ impl Evaluator for Tabulated {
         let tried = |effect: &usize| wanted(*effect) && (exhaustive || self.hidden != Some(*effect));
         let blocks =
             (0..EFFECTS.len()).filter(tried).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
-        blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
+        let beside = |(effect, beside, _): &(usize, usize, f64)| fit.model.has(*beside) && wanted(*effect);
+        let other = self.other_form.filter(beside).map(|(effect, ..)| rare_form(effect));
+        blocks.chain(other).map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
     }
 
     fn price(&self, _: &Block) -> f64 {
@@ -201,6 +209,19 @@ fn blocks_are_exchanged() {
     let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
     let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
     assert_eq!(found(&mut tabulated(&worth)), pair);
+}
+
+/// The better form is not found while another cause stands in for the one beside which it is better.
+#[test]
+fn a_rival_is_compared_in_its_best_forms() {
+    let (curve, gain, limit) = ("static-nonlinearity", "gain-error", "amplifier-limit");
+    let worth: [(&[&str], f64); 3] = [(&[curve], 60.0), (&[limit, curve], 100.0), (&[gain, curve], 95.0)];
+    let found_with = |worth_of_form: f64| {
+        let other_form = Some((effect(curve), effect(gain), worth_of_form));
+        found(&mut Tabulated { other_form, ..tabulated(&worth) })
+    };
+    assert_eq!(found_with(95.0), [limit, curve]);
+    assert_eq!(found_with(110.0), [gain, curve]);
 }
 
 #[test]
