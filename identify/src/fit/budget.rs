@@ -194,6 +194,15 @@ impl Budget {
         self.granted.load(Ordering::Relaxed)
     }
 
+    /// Returns the work that is left for the present search; none once its end was requested.
+    pub fn work_left(&self) -> u64 {
+        if self.is_stopped() {
+            return 0;
+        }
+        let used = self.spent().saturating_add(self.reserved.load(Ordering::Relaxed));
+        self.limit.load(Ordering::Relaxed).saturating_sub(used)
+    }
+
     /// Returns true if the search has to follow the most promising extensions only.
     pub fn is_scarce(&self) -> bool {
         self.spent() >= self.scarce.load(Ordering::Relaxed)

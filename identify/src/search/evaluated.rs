@@ -11,7 +11,7 @@ use crate::search::scored::{Scored, effects};
 use crate::stats::thresholds::empirical::{NATS_TO_EVALUATE_AGAIN, SAME_STAGE};
 
 /// Structures with their scores, under one penalty factor.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Evaluated {
     scored: HashMap<Vec<Block>, Scored>,
     /// Factor by which prices are multiplied, 1 or more.

@@ -11,6 +11,7 @@ use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
 use crate::search::first_fits::{Start, first_fits};
 use crate::search::initial_models::{initial_models, late_models};
+use crate::search::joint_gain::joint_extensions;
 use crate::search::penalty_factor::penalty_factor;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::{negligible, robust_scale, root_mean_square};
@@ -62,6 +63,17 @@ pub trait Evaluator {
 
     /// Returns the likeliest fit near that of a first fit.
     fn refit(&mut self, first: Fit) -> Fit;
+
+    /// Returns models that extend a fit by pairs and triples of blocks, of effects that are `wanted`, which promise most together under
+    /// independent noise: at most `most` of each, before they are fitted.
+    fn joint(&mut self, _fit: &Fit, _wanted: &dyn Fn(usize) -> bool, _most: usize) -> Vec<Model> {
+        Vec::new()
+    }
+
+    /// Returns the likeliest fit near that of a first fit as if the noise were independent.
+    fn fit_as_independent(&mut self, first: Fit) -> Fit {
+        first
+    }
 
     /// Log-likelihood of all rows, in nats, each predicted by a fit to the other folds.
     fn held_out(&mut self, fit: &Fit) -> f64;
@@ -121,6 +133,11 @@ pub trait Evaluator {
     /// True if the work for the search is nearly done, so that it follows the most promising structures only.
     fn is_scarce(&self) -> bool;
 
+    /// Work that is left for the search.
+    fn work_left(&self) -> u64 {
+        if self.is_over() { 0 } else { u64::MAX }
+    }
+
     /// True once the work for the search is done, or its end was requested: it ends with the best structure so far.
     fn is_over(&self) -> bool;
 }
@@ -149,6 +166,14 @@ impl Evaluator for Engine<'_> {
 
     fn refit(&mut self, first: Fit) -> Fit {
         Engine::refit(self, first)
+    }
+
+    fn joint(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool, most: usize) -> Vec<Model> {
+        joint_extensions(self, fit, wanted, most)
+    }
+
+    fn fit_as_independent(&mut self, first: Fit) -> Fit {
+        Engine::fit(self, first.model, &Noise::default_robust())
     }
 
     fn held_out(&mut self, fit: &Fit) -> f64 {
@@ -255,6 +280,10 @@ impl Evaluator for Engine<'_> {
 
     fn is_scarce(&self) -> bool {
         self.budget().is_scarce()
+    }
+
+    fn work_left(&self) -> u64 {
+        self.budget().work_left()
     }
 
     fn is_over(&self) -> bool {

@@ -72,6 +72,27 @@ impl GainPredictor {
         let informative = if self.noise.half_step > 0.0 { total } else { self.residual.len() as f64 };
         -0.5 * informative * (1.0 - part).ln()
     }
+
+    /// Unit vector of a change of the residual, in V, whitened and without what the model's own parameters can make, and the residual
+    /// along it; `None` if hardly anything of the change is left.
+    pub(super) fn direction(&self, change: &[f64]) -> Option<(Vec<f64>, f64)> {
+        let mut change: Vec<f64> =
+            self.noise.whitened(change).iter().zip(&self.roots).map(|(value, root)| value * root).collect();
+        let whole = norm(&change);
+        remove(&mut change, &self.own);
+        let left = norm(&change);
+        if !left.is_finite() || left < (DEPENDENT * whole).max(1e-5) {
+            return None;
+        }
+        change.iter_mut().for_each(|value| *value /= left);
+        let along = dot(&self.residual, &change);
+        Some((change, along))
+    }
+
+    /// Sum of the squares of the whole whitened residual.
+    pub(super) fn total(&self) -> f64 {
+        self.total
+    }
 }
 
 /// Euclidean norm, in the unit of the values.

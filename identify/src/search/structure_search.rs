@@ -16,7 +16,7 @@ const MODELS_IN_WARM_START: usize = 3;
 /// Structures in the beam.
 const BEAM: usize = 3;
 /// Largest number of blocks in a model.
-const MOST_BLOCKS: usize = 6;
+pub(super) const MOST_BLOCKS: usize = 6;
 /// Rounds in which each block is exchanged for every other.
 const EXCHANGES: usize = 3;
 
@@ -85,6 +85,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 let best = self.repriced(&best, &mut progress);
                 let best = self.with_rare_forms(best, &mut progress);
+                let best = self.as_independent(best, &mut progress);
                 return self.with_rivals_reformed(best, &mut progress);
             }
             self.extended.clear();
@@ -191,7 +192,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// The best of the simulation as it is given and of the evaluator's initial models.
-    fn start(&mut self) -> Scored {
+    pub(super) fn start(&mut self) -> Scored {
         let root = self.root();
         let models = self.evaluator.initial_models();
         let others: Vec<Scored> =
@@ -205,7 +206,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// The best structure that was evaluated; `other` if none has a finite score.
-    fn best_or(&self, other: &Scored) -> Scored {
+    pub(super) fn best_or(&self, other: &Scored) -> Scored {
         (*self.ranked().first().unwrap_or(&other)).clone()
     }
 
@@ -301,7 +302,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// Exchanges each block for every other while that raises the score.
-    fn settled(&mut self, mut best: Scored) -> Scored {
+    pub(super) fn settled(&mut self, mut best: Scored) -> Scored {
         for _ in 0..EXCHANGES {
             let before = best.score;
             for effect in effects(&best.fit.model) {

@@ -28,6 +28,8 @@ struct Tabulated {
     rare: Option<(usize, f64)>,
     /// Effect that has a better form beside another, in this order, and the log-likelihood of both with that form.
     other_form: Option<(usize, usize, f64)>,
+    /// True if the noise's autocorrelation follows all errors until nothing but noise is left.
+    is_followed: bool,
     /// Effect that cannot be distinguished from another cause.
     another: Option<usize>,
     /// Number of fits; evaluations at a given point are not counted.
@@ -51,6 +53,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         hidden: None,
         rare: None,
         other_form: None,
+        is_followed: false,
         another: None,
         fits: 0,
         most_fits: isize::MAX,
@@ -75,16 +78,16 @@ impl Evaluator for Tabulated {
         let is_other = |(effect, beside, _): &(usize, usize, f64)| has.contains(beside) && is_rare(*effect);
         let of_other = self.other_form.filter(is_other).map(|(_, _, worth)| worth);
         let log_likelihood = of_other.map_or(log_likelihood, |worth| log_likelihood.max(worth));
+        let white_noise_log_likelihood = log_likelihood;
+        // What causes add under independent noise adds little where an autoregression follows it, until nothing else is left.
+        let is_followed = self.is_followed && log_likelihood < self.clean;
+        let log_likelihood = if is_followed { log_likelihood.min(1.0) } else { log_likelihood };
         let mut noise = Noise::default_robust();
-        noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
-        Fit {
-            model,
-            residual: Vec::new(),
-            noise,
-            log_likelihood,
-            white_noise_log_likelihood: log_likelihood,
-            initial_state_cost: 0.0,
+        if is_followed {
+            noise.autocorrelation.ar = vec![0.9];
         }
+        noise.marginal = if self.quiet.is_none_or(|effect| has.contains(&effect)) { 1.0 } else { 10.0 };
+        Fit { model, residual: Vec::new(), noise, log_likelihood, white_noise_log_likelihood, initial_state_cost: 0.0 }
     }
 
     fn is_another_cause(&self, block: &Block, _: &[f64], _: f64) -> bool {
@@ -222,6 +225,25 @@ fn a_rival_is_compared_in_its_best_forms() {
     };
     assert_eq!(found_with(95.0), [limit, curve]);
     assert_eq!(found_with(110.0), [gain, curve]);
+}
+
+/// An autoregression follows the error until all three causes are there.
+#[test]
+fn causes_are_found_whose_error_the_noise_follows() {
+    let three: &[&str] = &["gain-error", "second-relaxation", "drift"];
+    let worth: [(&[&str], f64); 5] = [
+        (&["gain-error"], 60.0),
+        (&["gain-error", "hum"], 100.0),
+        (&["gain-error", "hum", "drift"], 140.0),
+        (&["gain-error", "hum", "drift", "second-relaxation"], 201.0),
+        (three, 200.0),
+    ];
+    let mut evaluator = Tabulated { is_followed: true, clean: 190.0, ..tabulated(&worth) };
+    let best = Search::new(&mut evaluator).run(|_| ());
+    let wanted: BTreeSet<usize> = three.iter().map(|cause| effect(cause)).collect();
+    assert_eq!(effects(&best.fit.model).into_iter().collect::<BTreeSet<_>>(), wanted);
+    // What leaves structure whatever is added is not found.
+    assert_eq!(found(&mut Tabulated { is_followed: true, clean: 250.0, ..tabulated(&worth) }), [""; 0]);
 }
 
 #[test]
