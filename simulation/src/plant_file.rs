@@ -446,15 +446,16 @@ impl PlantFile {
     }
 
     /// The size in V of the five steps of the stair on this spring behind an amplifier: the report's 100 V, or less where the stair would
-    /// end beyond the recorded limit, which a command that is no voltage shares with the amplifier's range, or at more than twice the end
-    /// of the law. Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
+    /// end at more than twice the recorded limit or the end of the law, or beyond the range of the amplifier, if the command is no voltage.
+    /// Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
     pub fn stair_step_v(&self, amplifier: model::Amplifier) -> f64 {
         let recorded = self.amplifier.as_ref().and_then(|amplifier| amplifier.limit_v);
         let of_other_command = self.units.as_ref().and_then(UnitNames::other_command).map(|_| amplifier.max_v);
-        let limit_v = recorded.into_iter().chain(of_other_command).fold(f64::INFINITY, f64::min);
-        let law_v = self.law.as_ref().and_then(|law| law.voltage_v.last().copied()).unwrap_or(f64::INFINITY);
-        let end_v = limit_v.min(law_v);
-        if end_v <= 0.0 || limit_v >= 5.0 * STAIR_STEP_V && law_v >= 2.5 * STAIR_STEP_V {
+        let law_v = self.law.as_ref().and_then(|law| law.voltage_v.last().copied());
+        let own_v = recorded.into_iter().chain(law_v).fold(f64::INFINITY, f64::min);
+        let range_v = of_other_command.unwrap_or(f64::INFINITY);
+        let end_v = own_v.min(range_v);
+        if end_v <= 0.0 || range_v >= 5.0 * STAIR_STEP_V && own_v >= 2.5 * STAIR_STEP_V {
             return STAIR_STEP_V;
         }
         let most_v = end_v / 7.0 * (1.0 + 1e-9);

@@ -29,7 +29,6 @@
 //! | `structure_search` | the search |
 //! | `as_independent` | a further search as if the noise were independent, where the first leaves structure |
 //! | `joint_gain` | pairs and triples of blocks that explain a residual together |
-//! | `rival_forms` | the other forms of what comes close to the best structure |
 //! | `extend` | a structure's extensions: which are fitted, and which of those are evaluated |
 //! | `predicting` | the structure that a search ends with, by held-out error where the likeliest does not predict |
 //! | `explored` | what a search has evaluated, for questions of the report |
@@ -45,7 +44,6 @@ mod joint_gain;
 mod penalty_factor;
 mod predicted_gain;
 mod predicting;
-mod rival_forms;
 mod scored;
 mod structure_search;
 #[cfg(test)]

@@ -85,8 +85,7 @@ impl<'e, E: Evaluator> Search<'e, E> {
                 self.evaluated.penalty_factor = penalty_factor.max(self.evaluated.penalty_factor);
                 let best = self.repriced(&best, &mut progress);
                 let best = self.with_rare_forms(best, &mut progress);
-                let best = self.as_independent(best, &mut progress);
-                return self.with_rivals_reformed(best, &mut progress);
+                return self.as_independent(best, &mut progress);
             }
             self.extended.clear();
             self.evaluated.reprice(self.evaluator, penalty_factor);

@@ -26,8 +26,6 @@ struct Tabulated {
     hidden: Option<usize>,
     /// Effect that also has a form that is seldom needed, and the log-likelihood of every set with it.
     rare: Option<(usize, f64)>,
-    /// Effect that has a better form beside another, in this order, and the log-likelihood of both with that form.
-    other_form: Option<(usize, usize, f64)>,
     /// True if the noise's autocorrelation follows all errors until nothing but noise is left.
     is_followed: bool,
     /// Effect that cannot be distinguished from another cause.
@@ -52,7 +50,6 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         clean: f64::INFINITY,
         hidden: None,
         rare: None,
-        other_form: None,
         is_followed: false,
         another: None,
         fits: 0,
@@ -75,9 +72,6 @@ impl Evaluator for Tabulated {
         let is_rare = |effect| model.blocks.iter().any(|(block, _)| *block == rare_form(effect));
         let of_rare = self.rare.filter(|(effect, _)| is_rare(*effect)).map(|(_, worth)| worth);
         let log_likelihood = of_rare.map_or(log_likelihood, |worth| log_likelihood.max(worth));
-        let is_other = |(effect, beside, _): &(usize, usize, f64)| has.contains(beside) && is_rare(*effect);
-        let of_other = self.other_form.filter(is_other).map(|(_, _, worth)| worth);
-        let log_likelihood = of_other.map_or(log_likelihood, |worth| log_likelihood.max(worth));
         let white_noise_log_likelihood = log_likelihood;
         // What causes add under independent noise adds little where an autoregression follows it, until nothing else is left.
         let is_followed = self.is_followed && log_likelihood < self.clean;
@@ -120,9 +114,7 @@ impl Evaluator for Tabulated {
         let tried = |effect: &usize| wanted(*effect) && (exhaustive || self.hidden != Some(*effect));
         let blocks =
             (0..EFFECTS.len()).filter(tried).collect::<Vec<_>>().into_iter().map(|effect| Block { effect, form: 0 });
-        let beside = |(effect, beside, _): &(usize, usize, f64)| fit.model.has(*beside) && wanted(*effect);
-        let other = self.other_form.filter(beside).map(|(effect, ..)| rare_form(effect));
-        blocks.chain(other).map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
+        blocks.map(|block| self.fit(fit.model.with(block, Vec::new()))).collect()
     }
 
     fn price(&self, _: &Block) -> f64 {
@@ -212,19 +204,6 @@ fn blocks_are_exchanged() {
     let pair: &[&str] = &["amplifier-slew", "charge-leakage"];
     let worth: [(&[&str], f64); 3] = [(&["delay"], 60.0), (&["delay", "charge-leakage"], 100.0), (pair, 150.0)];
     assert_eq!(found(&mut tabulated(&worth)), pair);
-}
-
-/// The better form is not found while another cause stands in for the one beside which it is better.
-#[test]
-fn a_rival_is_compared_in_its_best_forms() {
-    let (curve, gain, limit) = ("static-nonlinearity", "gain-error", "amplifier-limit");
-    let worth: [(&[&str], f64); 3] = [(&[curve], 60.0), (&[limit, curve], 100.0), (&[gain, curve], 95.0)];
-    let found_with = |worth_of_form: f64| {
-        let other_form = Some((effect(curve), effect(gain), worth_of_form));
-        found(&mut Tabulated { other_form, ..tabulated(&worth) })
-    };
-    assert_eq!(found_with(95.0), [limit, curve]);
-    assert_eq!(found_with(110.0), [gain, curve]);
 }
 
 /// An autoregression follows the error until all three causes are there.

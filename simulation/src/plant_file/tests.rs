@@ -195,7 +195,9 @@ fn steps_of_the_stair_follow_the_range_of_the_spring() {
         // A range that is only an option's is refused.
         ("", 400.0, 100.0),
         ("[amplifier]\nlimit_v = 500", 700.0, 100.0),
-        ("[amplifier]\nlimit_v = 430", 700.0, 50.0),
+        // A limit that the stair meets is to be seen.
+        ("[amplifier]\nlimit_v = 430", 700.0, 100.0),
+        ("[amplifier]\nlimit_v = 200", 700.0, 20.0),
         ("[units]\nvoltage = \"%\"", 700.0, 100.0),
         ("[units]\nvoltage = \"%\"", 100.0, 10.0),
         ("[units]\nvoltage = \"%\"\n[amplifier]\nlimit_v = 70", 100.0, 10.0),

@@ -208,8 +208,6 @@ thresholds! {
     NATS_TO_EVALUATE_AGAIN = 1.0, "nats";
     /// Largest loss of score at which a structure may stay in the beam while the noise is autocorrelated.
     NATS_TO_LOSE_IN_BEAM = 30.0, "nats";
-    /// A structure whose score is smaller by more than this is not fitted again in other forms.
-    NATS_TO_REFORM = 10.0, "nats";
 
     // verdict
     /// A smaller change of the voltage is not a reversal.
