@@ -169,7 +169,7 @@ fn uniform(mut state: u32) -> impl FnMut() -> f64 {
     }
 }
 
-/// Voltages of at least so many rows: ramps between random levels in up to `ramp` rows, most of them followed by a rest of up to `rest`.
+/// Voltages of at least `rows` rows: ramps between random levels in up to `ramp` rows, most of them followed by a rest of up to `rest`.
 fn ramps(rows: usize, [ramp, rest]: [f64; 2], mut uniform: impl FnMut() -> f64) -> Vec<f64> {
     let mut volts = vec![0.0; 20];
     while volts.len() < rows + 20 {

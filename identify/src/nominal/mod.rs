@@ -55,7 +55,7 @@ pub fn identify(records: &[Record], input: Input, units: &Units) -> Result<Ident
     identify_asked(records, Asked { input, units, order: None })
 }
 
-/// Identifies the spring as [`identify()`] does, but with so many poles, all of which the voltage drives.
+/// Identifies the spring as [`identify()`] does, but with a model of the given order: the number of poles, all of which the voltage drives.
 ///
 /// # Errors
 /// Those of [`identify()`], and [`simulation::bad_input::BadInput`] for an order that is not searched, or not with so few readings.
