@@ -169,7 +169,7 @@ impl Evaluator for Engine<'_> {
     }
 
     fn joint(&mut self, fit: &Fit, wanted: &dyn Fn(usize) -> bool, most: usize) -> Vec<Model> {
-        joint_extensions(self, fit, wanted, most)
+        joint_extensions(self, fit, wanted, |engine, block| engine.price(block), most)
     }
 
     fn fit_as_independent(&mut self, first: Fit) -> Fit {

@@ -11,7 +11,6 @@ use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, contains};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::Noise;
-use crate::search::evaluator::Evaluator;
 use crate::search::predicted_gain::GainPredictor;
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
@@ -43,14 +42,15 @@ struct Change {
 type BestOfEffects = HashMap<Vec<usize>, (f64, Vec<usize>)>;
 
 /// Returns the models that extend a fit by a pair or a triple of blocks, of effects that are `wanted`: the `most` pairs and the `most`
-/// triples that promise most, one for each set of effects.
+/// triples that promise most after their blocks' prices, in nats, one for each set of effects.
 pub(super) fn joint_extensions(
     engine: &mut Engine,
     fit: &Fit,
     wanted: &dyn Fn(usize) -> bool,
+    price: fn(&Engine, &Block) -> f64,
     most: usize,
 ) -> Vec<Model> {
-    let (changes, total) = changes(engine, fit, wanted);
+    let (changes, total) = changes(engine, fit, wanted, price);
     let rows = fit.residual.len();
     let count = changes.len();
     engine.budget().spend((count * count / 2 * rows) as u64 / ROWS_OF_PRODUCT);
@@ -124,7 +124,12 @@ pub(super) fn joint_extensions(
 }
 
 /// The changes that blocks make at their starts, without those that are alike, and the sum of squares of the whitened residual.
-fn changes(engine: &mut Engine, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> (Vec<Change>, f64) {
+fn changes(
+    engine: &mut Engine,
+    fit: &Fit,
+    wanted: &dyn Fn(usize) -> bool,
+    price: fn(&Engine, &Block) -> f64,
+) -> (Vec<Change>, f64) {
     let known = engine.observed.known(&fit.residual);
     let predictor = GainPredictor::new(engine, fit, Noise::robust(&known));
     let from_rest = engine.residual_from_rest(&fit.model);
@@ -138,10 +143,10 @@ fn changes(engine: &mut Engine, fit: &Fit, wanted: &dyn Fn(usize) -> bool) -> (V
         let mut found: Vec<Change> = Vec::new();
         for form in 0..of.common_forms() {
             let block = Block { effect, form };
-            let price = Evaluator::price(engine, &block);
+            let price = price(engine, &block);
             let points = of.initial_points(form, &FitContext { data: engine.data, residual: &residual, sigma });
             for point in points {
-                if engine.is_over() {
+                if engine.budget().is_over() {
                     return (Vec::new(), 1.0);
                 }
                 let there = engine.residual_from_rest(&fit.model.with(block, point.clone()));
