@@ -45,11 +45,8 @@ const PAPER: Spring = Spring {
 
 /// The report on a record of held levels with noise of 1 V.
 fn report(spring: &Spring, levels: &[f64]) -> Report {
-    let mut state = 1u32;
-    let mut uniform = move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-    };
+    let mut random = uniform(1);
+    let mut uniform = move || random() - 0.5;
     let (mut play, mut lag, mut slow, mut leak) = (0.0f64, 0.0, 0.0, 0.0);
     let follow =
         |state: &mut f64, target: f64, tau_s: f64| *state += (target - *state) * -f64::exp_m1(-SAMPLE_S / tau_s);

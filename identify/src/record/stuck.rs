@@ -263,7 +263,12 @@ impl Readings {
         run.start > 0
             && self.change(run.start).abs() <= self.largest
             && self.catches_up(run, self.largest)
-            && self.rests(run.end - MARGIN..run.end + MARGIN + 1)
+            && self.rests_at_the_end(run)
+    }
+
+    /// True if the voltage rests around the end of the run.
+    fn rests_at_the_end(&self, run: &Range<usize>) -> bool {
+        self.rests(run.end - MARGIN..run.end + MARGIN + 1)
     }
 
     /// Median change from row to row among the free readings beside the run, and at least what a coarse reading changes by; the median of
@@ -289,7 +294,7 @@ impl Readings {
     fn catches_up_at_rest(&self, run: &Range<usize>) -> bool {
         let half = run.start + run.len() / 2;
         self.catches_up(run, MOVES * self.typical.min(self.typical_beside(run)))
-            && (self.rests(half..run.end + 1) || self.stops(run) && self.rests(run.end - MARGIN..run.end + MARGIN + 1))
+            && (self.rests(half..run.end + 1) || self.stops(run) && self.rests_at_the_end(run))
     }
 
     /// True if the voltage changes in the first half of the run, and the readings elsewhere move in as many rows after such a change.

@@ -88,16 +88,15 @@ pub(crate) fn search(
         let effects = effects(&best.fit.model);
         let left_out: Vec<Scored> = effects.iter().map(|&effect| search.left_out(&best, effect)).collect();
         // A search that was cut off has not compared all of them with the best. An effect that nothing needs would hide another one.
-        match left_out.iter().filter(|without| without.score >= best.score).max_by(|a, b| a.score.total_cmp(&b.score)) {
-            Some(without) if effects.len() > 1 => {
-                let [with, without_it] = [&best, without].map(|of| held_out(search.evaluator(), &of.fit));
-                if without_it > AS_GOOD * with {
-                    break (rivals, effects, left_out);
-                }
-                best = without.clone();
-            }
-            _ => break (rivals, effects, left_out),
-        }
+        let as_likely = left_out.iter().filter(|without| without.score >= best.score && effects.len() > 1);
+        let likeliest = as_likely.max_by(|a, b| a.score.total_cmp(&b.score)).cloned();
+        let error = |engine: &mut Engine, of: &Scored| held_out(engine, &of.fit);
+        let Some(without) = likeliest
+            .filter(|without| error(search.evaluator(), without) <= AS_GOOD * error(search.evaluator(), &best))
+        else {
+            break (rivals, effects, left_out);
+        };
+        best = without;
     };
     // The best without a cause is chosen after all were evaluated, so that sentence and ranking name the same.
     let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
