@@ -103,7 +103,7 @@ impl Effect for AmplifierSlew {
     }
 
     /// Returns the lag of an operational amplifier that never reaches its rate.
-    fn nearest_special_case(&self, form: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+    fn nearest_special_case(&self, form: usize, point: &[f64], _: &Data) -> Option<(&'static str, usize, Vec<f64>)> {
         (form == WITH_TIME_CONSTANT).then(|| ("series-lag", series_lag::IN_FRONT, vec![point[1]]))
     }
 

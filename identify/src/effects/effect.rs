@@ -202,7 +202,12 @@ pub trait Effect: Sync {
 
     /// Returns the cause that is a special case of a form of the effect, with the form of that cause and its point nearest to a point;
     /// `None` if it has no special case.
-    fn nearest_special_case(&self, _form: usize, _point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+    fn nearest_special_case(
+        &self,
+        _form: usize,
+        _point: &[f64],
+        _data: &Data,
+    ) -> Option<(&'static str, usize, Vec<f64>)> {
         None
     }
 

@@ -120,7 +120,7 @@ impl Effect for Hysteresis {
     }
 
     /// Rayleigh's law without plays is a gain.
-    fn nearest_special_case(&self, form: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+    fn nearest_special_case(&self, form: usize, point: &[f64], _: &Data) -> Option<(&'static str, usize, Vec<f64>)> {
         is_rayleigh(form).then(|| ("gain-error", 0, vec![point[0] + point[1]]))
     }
 

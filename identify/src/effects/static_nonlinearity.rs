@@ -27,6 +27,7 @@ use crate::plant::restoring;
 use crate::plant::visited::Axis;
 use crate::record::data::Data;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
+use crate::stats::sums::dot;
 
 pub(super) struct StaticNonlinearity;
 
@@ -218,6 +219,18 @@ impl Effect for StaticNonlinearity {
             (Bent, _) => vec![Coordinate::log(0.01, 100.0), Coordinate::new(-5.0, 5.0)],
             (Kink, _) => vec![Coordinate::new(0.01, 0.95), Coordinate::new(0.0, 10.0)],
         }
+    }
+
+    /// The straight line through 0 that is nearest to a curve at the voltages of all rows: a curve that passes through the nominal gain where
+    /// the record has not been may be straight where it has. There is none for a restoring force, under which a lag is quicker as well.
+    fn nearest_special_case(&self, form: usize, point: &[f64], data: &Data) -> Option<(&'static str, usize, Vec<f64>)> {
+        if FORMS[form].1 == Within {
+            return None;
+        }
+        let (curve, voltages) = (continued(form, point, data), &data.voltage_v);
+        let settled: Vec<f64> = voltages.iter().map(|voltage| data.origin_v + curve(voltage - data.origin_v)).collect();
+        let gain = dot(&settled, voltages) / dot(voltages, voltages);
+        gain.is_finite().then(|| ("gain-error", 0, vec![gain]))
     }
 
     /// A curve needs one level of the voltage more than it has parameters.

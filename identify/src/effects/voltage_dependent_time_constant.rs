@@ -52,7 +52,7 @@ impl Effect for VoltageDependentTimeConstant {
     }
 
     /// Returns the constant time constant nearest to a point: the geometric mean of both ends. It does not see a nominal ratio of them.
-    fn nearest_special_case(&self, _: usize, point: &[f64]) -> Option<(&'static str, usize, Vec<f64>)> {
+    fn nearest_special_case(&self, _: usize, point: &[f64], _: &Data) -> Option<(&'static str, usize, Vec<f64>)> {
         Some(("time-constant", 0, vec![0.5 * (point[0] + point[1])]))
     }
 

@@ -244,7 +244,7 @@ impl Evaluator for Engine<'_> {
 
     fn simpler(&self, model: &Model) -> Vec<Model> {
         let special_case = |(block, point): &(Block, Vec<f64>)| {
-            let (cause, form, point) = block.effect().nearest_special_case(block.form, point)?;
+            let (cause, form, point) = block.effect().nearest_special_case(block.form, point, self.data)?;
             let effect = index_of(cause).filter(|effect| self.allows(cause) && !model.has(*effect))?;
             Some(model.without(block.effect).with(Block { effect, form }, point))
         };
@@ -480,6 +480,22 @@ mod tests {
         assert_eq!(simpler[0].structure(), offset.with(block("time-constant", 0), vec![4f64.ln()]).structure());
         assert!((simpler[0].point(block("time-constant", 0).effect).unwrap()[0] - 4f64.ln()).abs() < 1e-12);
         assert!(Evaluator::simpler(&Engine::new(&data, &observed, &base), &offset).is_empty());
+    }
+
+    /// In a record that stays far below the voltage at which a curve has the nominal gain, it may be a straight line.
+    #[test]
+    fn a_gain_is_simpler_than_a_curve() {
+        let data = data();
+        let (observed, base) = (Observed::new(&data), Base::paper());
+        let engine = Engine::new(&data, &observed, &base);
+        let block = |cause: &str, form| Block { effect: index_of(cause).unwrap(), form };
+        let of = |form, point| {
+            Evaluator::simpler(&engine, &Model::default().with(block("static-nonlinearity", form), point))
+        };
+        // 1 + a (x - X) at 100 V, where x = 1 and X = 5.
+        assert_eq!(of(0, vec![-0.04]), [Model::default().with(block("gain-error", 0), vec![1.16])]);
+        // A restoring force changes the lag as well.
+        assert!(of(11, vec![0.1, 0.0]).is_empty());
     }
 
     #[test]
