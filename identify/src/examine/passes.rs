@@ -196,7 +196,7 @@ pub(super) fn diagnose_together(
     if options.held_out_rmse.is_some_and(|of_full| simple.predicts_better_than(of_full)) {
         return Ok(simple);
     }
-    let budget = Budget::left(options.effort, rows, budget.spent(), rows, options.stop.clone());
+    let budget = Budget::left(options.effort, rows, budget.spent_of_own(), rows, options.stop.clone());
     let full = under(&options.base, records, options, only, &budget, progress)?;
     Ok(simple.or(full))
 }
@@ -498,6 +498,6 @@ fn on_part_of_rows(record: &ExaminedRecord, base: &Base, observed: &Observed, pr
     let mut engine = Engine::within(&part, &observed, base, record.budget).limited_to(record.only);
     record.budget.grant(SHARE_OF_PART);
     let mut search = Search::new(&mut engine);
-    search.run(progress);
+    search.run_once(progress);
     Some(search.warm_start())
 }

@@ -5,6 +5,8 @@
 //! ```text
 //! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
+//!
+//! A search of normal effort that leaves structure when its work is scarce goes on, once, with [`FURTHER`] times as much.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -18,7 +20,8 @@ use crate::fit::stop::Stop;
 pub enum Effort {
     /// A quarter of the normal effort.
     Quick,
-    /// At most 2 s of CPU time for 2400 rows, 8 s for 10 000 and 20 s for 100 000.
+    /// At most 2 s of CPU time for 2400 rows, 8 s for 10 000 and 20 s for 100 000; up to three times as much for up to 5000 rows whose
+    /// search ends while it finds causes.
     #[default]
     Normal,
     /// Ten times the normal effort.
@@ -70,6 +73,9 @@ const FOR_RARE_FORMS: f64 = 0.125;
 /// model leaves nothing but noise or a rare form promises much, or for the search of an equation (see [`Budget::left`]).
 const EXTENSION: f64 = 1.15;
 
+/// Ratio of the work with which a search of normal effort goes on, to the work that was granted to it.
+const FURTHER: f64 = 2.0;
+
 /// Work that an effort allows for a record.
 fn work(effort: Effort, rows: usize) -> f64 {
     WORK * effort.ratio() * (rows as f64 / ROWS).powf(GROWTH).max(1.0)
@@ -90,8 +96,14 @@ pub struct Budget {
     released: AtomicBool,
     /// True if a search ended because its work was done.
     cut: AtomicBool,
+    /// True if the present one did.
+    present_cut: AtomicBool,
     /// True if a search has found a model that leaves nothing but noise, and may do more work.
     extended: AtomicBool,
+    /// True if a search may go on with more work, once.
+    may_go_on: AtomicBool,
+    /// Work with which a search has gone on.
+    further: AtomicU64,
     stop: Option<Stop>,
 }
 
@@ -109,25 +121,34 @@ impl Budget {
             reserved: AtomicU64::new(0),
             released: AtomicBool::new(false),
             cut: AtomicBool::new(false),
+            present_cut: AtomicBool::new(false),
             extended: AtomicBool::new(false),
+            may_go_on: AtomicBool::new(false),
+            further: AtomicU64::new(0),
             stop,
         }
     }
 
+    /// Returns the same budget for work of an effort.
+    fn with(self, effort: Effort) -> Self {
+        Self { may_go_on: AtomicBool::new(effort == Effort::Normal), ..self }
+    }
+
     /// Returns the budget for a record with a number of rows; `stop` ends it early.
     pub fn new(effort: Effort, rows: usize, stop: Stop) -> Self {
-        Self::of(work(effort, rows) as u64, Some(stop))
+        Self::part(1.0, effort, rows, stop)
     }
 
     /// Returns a part of the budget for a record with a number of rows.
     pub fn part(part: f64, effort: Effort, rows: usize, stop: Stop) -> Self {
-        Self::of((part * work(effort, rows)) as u64, Some(stop))
+        Self::of((part * work(effort, rows)) as u64, Some(stop)).with(effort)
     }
 
     /// Returns what a diagnosis that has spent some work on a record leaves for a further search, on `rows_searched` of its rows.
     pub fn left(effort: Effort, rows: usize, spent: u64, rows_searched: usize, stop: Stop) -> Self {
-        let left = (EXTENSION * work(effort, rows)) as u64;
-        Self::of(left.saturating_sub(spent).min(work(effort, rows_searched) as u64), Some(stop))
+        let own = work(effort, rows);
+        let left = ((EXTENSION * own) as u64).saturating_sub(spent).max(((EXTENSION - 1.0) * own) as u64);
+        Self::of(left.min(work(effort, rows_searched) as u64), Some(stop)).with(effort)
     }
 
     /// Counts work.
@@ -140,12 +161,18 @@ impl Budget {
         self.spent.load(Ordering::Relaxed)
     }
 
+    /// Returns the work that was done without what a search went on with.
+    pub fn spent_of_own(&self) -> u64 {
+        self.spent().saturating_sub(self.further.load(Ordering::Relaxed))
+    }
+
     /// Returns the work that may be done in all.
     pub fn total(&self) -> u64 {
-        match self.extended.load(Ordering::Relaxed) {
+        let own = match self.extended.load(Ordering::Relaxed) {
             true => (EXTENSION * self.total as f64) as u64,
             false => self.total,
-        }
+        };
+        own.saturating_add(self.further.load(Ordering::Relaxed))
     }
 
     /// Gives the next search a share of the work that is left, 0 to 1.
@@ -158,6 +185,7 @@ impl Budget {
         self.granted.store(granted(1.0) - spent, Ordering::Relaxed);
         self.reserved.store(0, Ordering::Relaxed);
         self.released.store(false, Ordering::Relaxed);
+        self.present_cut.store(false, Ordering::Relaxed);
     }
 
     /// Keeps a part of the present search's work back until [`Budget::release`] or [`Budget::extend`].
@@ -187,6 +215,27 @@ impl Budget {
         for limit in [&self.scarce, &self.limit, &self.granted] {
             limit.fetch_add(more, Ordering::Relaxed);
         }
+    }
+
+    /// Lets the present search, if its work has ended it, go on with more, once; true if it does.
+    pub fn go_on(&self) -> bool {
+        self.note_cut();
+        let is_cut = self.present_cut.load(Ordering::Relaxed) && !self.is_stopped();
+        if !is_cut || !self.may_go_on.swap(false, Ordering::Relaxed) {
+            return false;
+        }
+        let further = (FURTHER * self.granted() as f64) as u64;
+        self.further.store(further, Ordering::Relaxed);
+        let (spent, limit) = (self.spent(), self.limit.load(Ordering::Relaxed).saturating_add(further));
+        let granted = limit.saturating_sub(spent);
+        self.limit.store(limit, Ordering::Relaxed);
+        self.granted.store(granted, Ordering::Relaxed);
+        self.scarce.store(spent + (SCARCE * granted as f64) as u64, Ordering::Relaxed);
+        self.reserved.store(0, Ordering::Relaxed);
+        self.released.store(false, Ordering::Relaxed);
+        self.cut.store(false, Ordering::Relaxed);
+        self.present_cut.store(false, Ordering::Relaxed);
+        true
     }
 
     /// Returns the work that was granted to the present search.
@@ -228,11 +277,56 @@ impl Budget {
     fn note_cut(&self) {
         if self.is_over() && !self.released.load(Ordering::Relaxed) || self.is_stopped() {
             self.cut.store(true, Ordering::Relaxed);
+            self.present_cut.store(true, Ordering::Relaxed);
         }
     }
 
     /// Returns true if a search ended because its work was done, or because the end was requested.
     pub fn was_cut(&self) -> bool {
         self.cut.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn granted(effort: Effort) -> Budget {
+        let budget = Budget::new(effort, 400, Stop::default());
+        budget.grant(0.5);
+        budget
+    }
+
+    #[test]
+    fn a_search_of_normal_effort_that_its_work_ended_goes_on_once() {
+        let budget = granted(Effort::Normal);
+        let own = budget.granted();
+        assert!(!budget.go_on(), "its work has not ended");
+        budget.spend(own);
+        assert!(budget.is_over() && budget.go_on() && !budget.is_over() && !budget.is_scarce());
+        assert_eq!((budget.work_left(), budget.total()), (2 * own, 4 * own));
+        budget.spend(2 * own);
+        assert_eq!((budget.spent(), budget.spent_of_own()), (3 * own, own));
+        assert!(budget.is_over() && !budget.go_on());
+        budget.close();
+        assert!(budget.was_cut() && budget.work_left() == own, "the rest is for the report");
+    }
+
+    #[test]
+    fn a_search_that_goes_on_is_not_cut_by_the_work_that_ended_it_before() {
+        let budget = granted(Effort::Normal);
+        budget.spend(budget.granted());
+        assert!(budget.go_on());
+        budget.close();
+        assert!(!budget.was_cut());
+    }
+
+    #[test]
+    fn a_search_of_another_effort_ends_with_its_work() {
+        for effort in [Effort::Quick, Effort::Thorough] {
+            let budget = granted(effort);
+            budget.spend(budget.granted());
+            assert!(budget.is_over() && !budget.go_on() && budget.is_over());
+        }
     }
 }

@@ -133,6 +133,11 @@ pub trait Evaluator {
     /// True if the work for the search is nearly done, so that it follows the most promising structures only.
     fn is_scarce(&self) -> bool;
 
+    /// Gives a search that its work has ended more of it, once, if its best fit explains most of the errors; true if it did.
+    fn go_on(&mut self, _best: &Fit) -> bool {
+        false
+    }
+
     /// Work that is left for the search.
     fn work_left(&self) -> u64 {
         if self.is_over() { 0 } else { u64::MAX }
@@ -282,6 +287,11 @@ impl Evaluator for Engine<'_> {
         self.budget().is_scarce()
     }
 
+    fn go_on(&mut self, best: &Fit) -> bool {
+        root_mean_square(&best.residual) < PART_LEFT * root_mean_square(&self.baseline_residual)
+            && self.budget().go_on()
+    }
+
     fn work_left(&self) -> u64 {
         self.budget().work_left()
     }
@@ -291,6 +301,8 @@ impl Evaluator for Engine<'_> {
     }
 }
 
+/// Largest part of the errors, root mean square, that a search may leave to get more work: where nothing fits, more is no use.
+const PART_LEFT: f64 = 0.5;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.

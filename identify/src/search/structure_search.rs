@@ -69,8 +69,20 @@ impl<'e, E: Evaluator> Search<'e, E> {
     }
 
     /// Searches from the simulation as it is given and returns the best structure; `progress` receives each structure that
-    /// becomes the best.
+    /// becomes the best. A search whose work ends before it has found all of what it was finding goes on with more, from the beginning, with
+    /// what it has evaluated.
     pub fn run(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
+        let best = self.run_once(&mut progress);
+        if !self.evaluator.leaves_structure(&best.fit) || !self.evaluator.go_on(&best.fit) {
+            return best;
+        }
+        self.extended.clear();
+        self.evaluated.reprice(self.evaluator, 1.0);
+        self.run_once(progress)
+    }
+
+    /// Searches from the simulation as it is given, with the work that was granted, and returns the best structure.
+    pub fn run_once(&mut self, mut progress: impl FnMut(&Scored)) -> Scored {
         self.evaluator.reserve_for_rare_forms();
         for model in self.evaluator.late_models() {
             self.evaluated.evaluate_from(self.evaluator, model);

@@ -34,6 +34,8 @@ struct Tabulated {
     fits: isize,
     /// Number of fits at which the search has to end.
     most_fits: isize,
+    /// Number of further fits with which it may go on.
+    further_fits: isize,
 }
 
 fn effect(cause: &str) -> usize {
@@ -54,6 +56,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         another: None,
         fits: 0,
         most_fits: isize::MAX,
+        further_fits: 0,
     }
 }
 
@@ -135,6 +138,12 @@ impl Evaluator for Tabulated {
 
     fn found_adequate(&mut self) {}
 
+    fn go_on(&mut self, _: &Fit) -> bool {
+        let may = self.is_over() && self.further_fits > 0;
+        self.most_fits += std::mem::take(&mut self.further_fits);
+        may
+    }
+
     fn is_scarce(&self) -> bool {
         2 * self.fits >= self.most_fits
     }
@@ -157,6 +166,17 @@ fn a_block_is_added_if_it_gains_more_than_its_price() {
     assert_eq!(found(&mut evaluator), ["delay", "hum"]);
     // Each structure is fitted once for each that it extends, and evaluated once.
     assert!(evaluator.fits < 200, "{} fits", evaluator.fits);
+}
+
+#[test]
+fn a_search_whose_work_ends_with_structure_left_goes_on() {
+    let worth: &[(&[&str], f64)] = &[(&["delay"], 50.0), (&["hum"], 30.0), (&["delay", "hum"], 80.0)];
+    let with = |further_fits, clean| Tabulated { most_fits: 30, further_fits, clean, ..tabulated(worth) };
+    assert_eq!(found(&mut with(0, 70.0)), ["delay"], "its work has ended it");
+    assert_eq!(found(&mut with(200, 70.0)), ["delay", "hum"]);
+    let mut evaluator = with(200, 50.0);
+    assert_eq!(found(&mut evaluator), ["delay"]);
+    assert_eq!(evaluator.further_fits, 200, "it leaves no structure");
 }
 
 #[test]
