@@ -7,20 +7,17 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use random_numbers::Lcg32;
 use tempfile::TempDir;
 
 /// Rows of a voltage that changes at every row, with a response that no cause explains: a thorough search takes minutes.
 fn write_record(path: &Path) {
-    let mut state = 1u32;
-    let mut uniform = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 24)
-    };
+    let mut numbers = Lcg32::new(1);
     let mut text = "time_s,voltage_v,stiffness\n".to_owned();
     let mut slow = 0.0;
     for row in 0..4000 {
-        let voltage_v = 500.0 * uniform();
-        let reading = slow + 0.0006 * (voltage_v - slow) * (slow - 250.0) * (slow / 60.0).sin() + uniform();
+        let voltage_v = 500.0 * numbers.uniform();
+        let reading = slow + 0.0006 * (voltage_v - slow) * (slow - 250.0) * (slow / 60.0).sin() + numbers.uniform();
         slow += 0.04 * (voltage_v - slow);
         writeln!(text, "{},{voltage_v},{reading}", 0.2 * f64::from(row)).unwrap();
     }

@@ -20,6 +20,7 @@ use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::record::observed::Observed;
+use random_numbers::SplitMix64;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
@@ -104,16 +105,10 @@ fn effect(cause: &str, point: f64) -> Model {
     Model::default().with(Block { effect: index_of(cause).expect("an effect"), form: 0 }, vec![point])
 }
 
-/// Independent numbers of mean 0 and variance 1, nearly normal: sums of twelve uniform numbers of splitmix64.
+/// Independent, nearly normal numbers of mean 0 and variance 1.
 fn normals(seed: usize) -> Vec<f64> {
-    let mut state = 0x5bd1_e995_u64.wrapping_mul(seed as u64 + 1);
-    let mut uniform = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..ROWS).map(|_| (0..12).map(|_| uniform() - 0.5).sum()).collect()
+    let mut numbers = SplitMix64::new(0x5bd1_e995_u64.wrapping_mul(seed as u64 + 1));
+    (0..ROWS).map(|_| numbers.normal()).collect()
 }
 
 /// Lower 95 % confidence bound of a probability, by bisection: the probability at which `count` or more of `all` occur in one of

@@ -9,6 +9,7 @@ use identify::effects::model::Model;
 use identify::fit::simulator::Simulator;
 use identify::record::data::Data;
 use identify::{Input, Options, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -25,13 +26,11 @@ fn record(read: impl Fn(usize, f64) -> f64) -> Record {
     };
     let mut record = Record { name: "stair".into(), rows: (0..1100).map(row).collect() };
     let data = Data::new(&record, Input::Hold);
-    let (mut simulated, mut state) = (Vec::new(), 1u32);
+    let (mut simulated, mut numbers) = (Vec::new(), Lcg32::new(1));
     Simulator::new(&data, &Options::default().base).run(&Model::default(), &mut simulated);
     for (index, (row, simulated)) in record.rows.iter_mut().zip(simulated).enumerate() {
         // Reproducible uniform noise of 0.3 V RMS.
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let noise = f64::from(state >> 8) / f64::from(1 << 24) - 0.5;
-        row.measured = Some(read(index, simulated + noise));
+        row.measured = Some(read(index, simulated + (numbers.uniform() - 0.5)));
     }
     record
 }

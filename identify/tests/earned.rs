@@ -2,31 +2,20 @@
 //! series that only a linear model knows, and of a change that ends.
 
 use identify::{Effort, Options, Report, Stop, Verdict, diagnose};
+use random_numbers::Lcg64;
 use simulation::plant_file;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
 const SAMPLE_S: f64 = 0.1;
 
-/// Independent noise of variance 1: sums of twelve uniform numbers.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        (0..12).map(|_| uniform()).sum()
-    }
-}
-
 /// A record under 48 levels of 5 s each; `step` moves the relaxed part, and `read` is the stiffness, of voltage, state and time.
 fn record(step: impl Fn(f64, f64, f64) -> f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
-    let (mut state, mut noise) = (0.0, noise(11));
+    let (mut state, mut noise) = (0.0, Lcg64::new(11));
     let row = |row: usize| {
         let (time_s, voltage_v) =
             (SAMPLE_S * row as f64, if row < 50 { 0.0 } else { 50.0 * (row / 50 * 7 % 11) as f64 });
-        let measured = Some(read(voltage_v, state, time_s) + noise());
+        let measured = Some(read(voltage_v, state, time_s) + noise.normal());
         state = step(voltage_v, state, time_s);
         Row { line: row + 2, time_s, voltage_v, measured }
     };
@@ -64,9 +53,9 @@ fn a_right_simulation_in_a_control_loop_is_not_wrong() {
     let spring = "schema = 1\n[relaxation]\nshare = 0.0\ntau_s = 5.5\n";
     let options = Options::default().judging_file("loop", plant_file::parse("loop", spring).unwrap()).unwrap();
     for (in_feedback, expected) in [(true, Verdict::Insufficient), (false, Verdict::Consistent)] {
-        let (mut state, mut slow, mut sum, mut noise) = (0.0, 0.0, 0.0, noise(11));
+        let (mut state, mut slow, mut sum, mut noise) = (0.0, 0.0, 0.0, Lcg64::new(11));
         let row = |row: usize| {
-            slow = 0.95 * slow + 0.5 * noise();
+            slow = 0.95 * slow + 0.5 * noise.normal();
             let target = [100.0, 250.0, 50.0, 300.0, 150.0, 200.0][row / 200 % 6];
             let error = target - (state + slow);
             let controlled: f64 = 5.0 * error + sum;

@@ -3,18 +3,11 @@
 use std::time::Duration;
 
 use identify::{Effort, Options, Report, Stop, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
 const SAMPLE_S: f64 = 0.2;
-
-/// Uniform random numbers from 0 to 1.
-fn random(mut state: u32) -> impl FnMut() -> f64 {
-    move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 24)
-    }
-}
 
 /// A sine whose frequency rises from 2 mHz to 0.8 Hz.
 fn chirp(row: usize) -> f64 {
@@ -24,10 +17,10 @@ fn chirp(row: usize) -> f64 {
 
 /// A record of a spring with the paper's time constant, whose error depends on the voltage, the slow and a fast state.
 fn record(voltage_v: &[f64], pause_s: f64, error: impl Fn(f64, f64, f64) -> f64) -> Record {
-    let (mut slow, mut fast, mut noise) = (voltage_v[0], voltage_v[0], random(9));
+    let (mut slow, mut fast, mut noise) = (voltage_v[0], voltage_v[0], Lcg32::new(9));
     let row = |(row, &voltage_v): (usize, &f64)| {
         let time_s = SAMPLE_S * row as f64 + if 2 * row > ROWS { pause_s } else { 0.0 };
-        let measured = slow / 1.1 + voltage_v / 11.0 + error(voltage_v, slow, fast) + noise() - 0.5;
+        let measured = slow / 1.1 + voltage_v / 11.0 + error(voltage_v, slow, fast) + noise.uniform() - 0.5;
         slow = voltage_v + (slow - voltage_v) * f64::exp(-SAMPLE_S / 5.5);
         fast = voltage_v + (fast - voltage_v) * f64::exp(-SAMPLE_S / 0.8);
         Row { line: row + 2, time_s, voltage_v, measured: Some(measured) }
@@ -46,8 +39,8 @@ fn report(record: &Record, effort: Effort, stop: Stop) -> Report {
 
 #[test]
 fn work_stays_within_the_effort_where_nothing_fits() {
-    let mut uniform = random(1);
-    let at_every_row: Vec<f64> = (0..ROWS).map(|_| 500.0 * uniform()).collect();
+    let mut numbers = Lcg32::new(1);
+    let at_every_row: Vec<f64> = (0..ROWS).map(|_| 500.0 * numbers.uniform()).collect();
     let chirp: Vec<f64> = (0..ROWS).map(chirp).collect();
     let stairs: Vec<f64> = (0..ROWS).map(|row| 100.0 * ((row / 40 * 7) % 6) as f64).collect();
     for (voltage_v, pause_s) in [(&at_every_row, 0.0), (&chirp, 0.0), (&stairs, 0.0), (&stairs, 1e4)] {

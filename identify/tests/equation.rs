@@ -13,6 +13,7 @@ use identify::record::data::Data;
 use identify::record::normalisation::Normalisation;
 use identify::record::observed::Observed;
 use identify::{Input, Options, Stop, Verdict, answer::Equation, diagnose};
+use random_numbers::Lcg64;
 use simulation::plant_file::Reading;
 use simulation::record::{Record, Row};
 use simulation::units::Units;
@@ -21,14 +22,10 @@ const ROWS: usize = 1600;
 const ROW_S: f64 = 0.15;
 const PARTS: usize = 50;
 
-/// Independent numbers of unit variance: sums of twelve uniform numbers from a 64-bit congruential generator.
+/// Independent, nearly normal numbers of variance 1.
 fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut uniform = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    move || (0..12).map(|_| uniform() - 0.5).sum()
+    let mut numbers = Lcg64::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    move || numbers.normal()
 }
 
 /// A stair of unequal steps up and down, in V, held for 60 rows each, after a rest.

@@ -5,20 +5,9 @@ use std::f64::consts::TAU;
 
 use identify::plant::base::Base;
 use identify::{Options, Report, Verdict, diagnose};
+use random_numbers::Lcg64;
 use simulation::plant_file::{PlantFile, Reading};
 use simulation::record::{Record, Row};
-
-/// Reproducible independent noise of variance 1: sums of twelve uniform numbers.
-fn noise() -> impl FnMut() -> f64 {
-    let mut state = 7u64;
-    move || {
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        (0..12).map(|_| uniform()).sum()
-    }
-}
 
 struct Spring {
     tau_s: f64,
@@ -35,12 +24,12 @@ impl Spring {
     /// Returns a record of 600 rows under a stair with the given voltages, each held for four time constants, with noise of 0.1 %
     /// of 500 V.
     fn record(&self, levels: [f64; 6]) -> Record {
-        let (mut lag, mut noise) = (0.0, noise());
+        let (mut lag, mut noise) = (0.0, Lcg64::new(7));
         let step_s = self.tau_s / 25.0;
         let row = |row: usize| {
             let voltage_v = levels[row / 100];
             let settled = (self.law)(voltage_v);
-            let stiffness = self.share * settled + (1.0 - self.share) * lag + 0.5 * noise();
+            let stiffness = self.share * settled + (1.0 - self.share) * lag + 0.5 * noise.normal();
             lag = settled + (lag - settled) * f64::exp(-step_s / self.tau_s);
             let measured = Some(self.zero + self.gain * stiffness);
             Row { line: row + 2, time_s: step_s * row as f64, voltage_v, measured }
@@ -123,12 +112,12 @@ fn a_voltage_of_both_signs_agrees_with_the_papers_spring() {
 #[test]
 fn a_resonator_under_a_multisine_is_diagnosed() {
     let (omega, zeta, step_s) = (TAU * 68.0, 0.05, 1.0 / 1600.0);
-    let (mut x, mut v, mut noise) = (0.0, 0.0, noise());
+    let (mut x, mut v, mut noise) = (0.0, 0.0, Lcg64::new(7));
     let row = |row: usize| {
         let time_s = step_s * row as f64;
         let line = |line: i32| (TAU * (5.0 + 7.6 * f64::from(line)) * time_s + f64::from(line * line)).sin();
         let voltage_v: f64 = 30.0 * (0..20).map(line).sum::<f64>();
-        let measured = Some(x + 0.2 * noise());
+        let measured = Some(x + 0.2 * noise.normal());
         for _ in 0..20 {
             v += step_s / 20.0 * (omega * omega * (voltage_v - x) - 2.0 * zeta * omega * v);
             x += step_s / 20.0 * v;

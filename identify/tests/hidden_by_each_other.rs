@@ -1,6 +1,7 @@
 //! Causes are found that hide each other, so that none of them explains much without the others.
 
 use identify::{Options, Verdict, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 900;
@@ -16,20 +17,16 @@ const SLOW: (f64, f64) = (0.12, 38.6);
 
 /// The paper's spring under steps to random levels, with noise of 1 V.
 fn record() -> Record {
-    let mut seed = 5u32;
-    let mut random = || {
-        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(seed >> 8) / f64::from(1 << 24)
-    };
+    let mut random = Lcg32::new(5);
     let (mut voltage_v, mut lag, mut slow) = (0.0, 0.0, 0.0);
     let row = |row: usize| {
         if row >= 25 && row % HELD == 5 {
-            voltage_v = (500.0 * random()).round();
+            voltage_v = (500.0 * random.uniform()).round();
         }
         let input = GAIN * voltage_v;
         let quick = SHARE * input + (1.0 - SHARE) * lag;
         let response = (1.0 - SLOW.0) * quick + SLOW.0 * slow + OFFSET_V;
-        let measured = response + (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let measured = response + random.normal();
         lag += (input - lag) * -f64::exp_m1(-SAMPLE_S / TAU_S);
         slow += (input - slow) * -f64::exp_m1(-SAMPLE_S / SLOW.1);
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured: Some(measured) }

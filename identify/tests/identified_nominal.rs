@@ -1,28 +1,22 @@
 //! Diagnoses of a spring that was identified from the same record: what a linear model lacks is named, and what it has is no cause.
 
 use identify::{Diagnosis, Input, Options, Verdict, examine, identify};
+use random_numbers::{Lcg32, Lcg64};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
 const ROWS: usize = 1200;
 
-/// Independent noise of variance 1: sums of twelve uniform numbers.
+/// Independent, nearly normal noise of variance 1.
 fn normals() -> Vec<f64> {
-    let mut state = 7u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
-    (0..ROWS).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+    let mut numbers = Lcg64::new(7);
+    (0..ROWS).map(|_| numbers.normal()).collect()
 }
 
 /// Voltage in levels of 12 to 20 V, each held for 15 to 45 rows: never near 0 V.
 fn levels() -> Vec<f64> {
-    let mut state = 1u32;
-    let mut random = |of: u32| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) % of
-    };
+    let mut numbers = Lcg32::new(1);
+    let mut random = |of: u32| (numbers.draw() >> 8) % of;
     let mut voltage = Vec::new();
     while voltage.len() < ROWS {
         let (level, held) = (12.0 + 8.0 * f64::from(random(1000)) / 999.0, 15 + random(30) as usize);

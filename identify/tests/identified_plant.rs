@@ -2,6 +2,7 @@
 
 use identify::nominal::report::InputLaw;
 use identify::{Input, Options, Verdict, examine, examine_several, identify};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -22,17 +23,13 @@ fn record_from(
     heights: [f64; 2],
 ) -> Record {
     let (sample_s, steps) = (0.05, 400);
-    let mut seed = 7u32;
-    let mut random = || {
-        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(seed >> 8) / f64::from(1 << 24)
-    };
+    let mut random = Lcg32::new(7);
     let (mut state, mut voltage_v) = (start, 0.0);
     let mut row = |index: usize| {
         if index % 23 == first_step {
-            voltage_v = heights[0] + (heights[1] - heights[0]) * random();
+            voltage_v = heights[0] + (heights[1] - heights[0]) * random.uniform();
         }
-        let measured = Some(reading(voltage_v, state) + 0.01 * (random() - 0.5));
+        let measured = Some(reading(voltage_v, state) + 0.01 * (random.uniform() - 0.5));
         for _ in 0..steps {
             let rate = rates(voltage_v, state);
             state = [0, 1].map(|of| state[of] + rate[of] * sample_s / f64::from(steps));

@@ -7,6 +7,7 @@ use identify::fit::simulator::Simulator;
 use identify::plant::base::Base;
 use identify::record::data::Data;
 use identify::{Options, Report, examine};
+use random_numbers::Lcg32;
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{Record, Row};
 
@@ -22,11 +23,10 @@ fn law(voltage: f64) -> f64 {
 
 /// A record of a spring with a static law and a time constant over the voltage, read with uniform noise of 0.3 V RMS.
 fn record(volts: impl Fn(f64) -> f64, settled: impl Fn(f64) -> f64, tau_s: impl Fn(f64) -> f64) -> Record {
-    let (mut lag_v, mut state) = (settled(volts(LEVELS[0])), 3u32);
+    let (mut lag_v, mut numbers) = (settled(volts(LEVELS[0])), Lcg32::new(3));
     let row = |index: usize| {
         let voltage_v = volts(LEVELS[index / ROWS_PER_LEVEL]);
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let noise = f64::from(state >> 8) / f64::from(1 << 24) - 0.5;
+        let noise = numbers.uniform() - 0.5;
         let measured = Some(settled(voltage_v) / 11.0 + lag_v * 10.0 / 11.0 + noise);
         lag_v = settled(voltage_v) + (lag_v - settled(voltage_v)) * f64::exp(-SAMPLE_S / tau_s(voltage_v));
         Row { line: index + 2, time_s: SAMPLE_S * index as f64, voltage_v, measured }

@@ -1,6 +1,7 @@
 //! Laws of a cause that differ from its usual one, in records of a small simulator in this file: the cause is the first finding.
 
 use identify::{Options, Report, Verdict, diagnose};
+use random_numbers::Lcg64;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2400;
@@ -8,15 +9,6 @@ const SAMPLE_S: f64 = 0.1;
 /// Integration steps per row.
 const STEPS: usize = 40;
 const TAU_S: f64 = 5.5;
-
-/// Reproducible uniform numbers from 0 to 1.
-fn uniform(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 /// Returns a record of levels that are held for 6 to 16 s. `tau_s` is the time constant over settled stiffness and relaxed part,
 /// `reads` makes a reading of row and stiffness; noise of 1 V is added.
@@ -31,19 +23,19 @@ fn settling(
     tau_s: impl Fn(f64, f64) -> f64,
     mut reads: impl FnMut(usize, f64) -> f64,
 ) -> Record {
-    let mut random = uniform(seed);
+    let mut random = Lcg64::new(seed);
     let (mut voltage_v, mut settled, mut relaxed, mut until) = (0.0, 0.0, 0.0, 40);
     let row = |row: usize| {
         if row == until {
-            voltage_v = 50.0 * (11.0 * random()).floor();
+            voltage_v = 50.0 * (11.0 * random.uniform()).floor();
             settled = settles(voltage_v);
-            until += 60 + (100.0 * random()) as usize;
+            until += 60 + (100.0 * random.uniform()) as usize;
         }
         let stiffness = settled / 11.0 + 10.0 / 11.0 * relaxed;
         for _ in 0..STEPS {
             relaxed += (settled - relaxed) * SAMPLE_S / STEPS as f64 / tau_s(settled, relaxed);
         }
-        let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let noise = random.normal();
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured: Some(reads(row, stiffness) + noise) }
     };
     Record { name: "levels".into(), rows: (0..ROWS).map(row).collect() }
@@ -176,10 +168,10 @@ fn flow_is_a_second_relaxation_that_is_added() {
 fn sensor_that_overshoots_slightly_is_a_lag() {
     // A damping ratio of 0.7 at 2 rad/s; the voltage passes the sensor before the spring, which has the same response.
     let mut overshoots = record(12, |_, _| TAU_S, |_, stiffness| stiffness);
-    let mut random = uniform(16);
+    let mut random = Lcg64::new(16);
     let (mut x, mut rate, mut relaxed) = (0.0f64, 0.0f64, 0.0f64);
     for row in &mut overshoots.rows {
-        let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let noise = random.normal();
         row.measured = Some(x / 11.0 + 10.0 / 11.0 * relaxed + noise);
         for _ in 0..STEPS {
             let step_s = SAMPLE_S / STEPS as f64;
@@ -205,9 +197,9 @@ fn hum_may_follow_the_response() {
 #[test]
 fn readings_that_were_lost_are_late_and_the_others_are_diagnosed() {
     let mut held = record(14, |_, _| TAU_S, |_, stiffness| stiffness);
-    let mut random = uniform(15);
+    let mut random = Lcg64::new(15);
     for row in 1..ROWS {
-        if random() < 0.4 {
+        if random.uniform() < 0.4 {
             held.rows[row].measured = held.rows[row - 1].measured;
         }
     }
@@ -221,10 +213,10 @@ fn readings_that_were_lost_are_late_and_the_others_are_diagnosed() {
 fn restoring_force_that_is_not_linear_is_a_static_nonlinearity() {
     for (seed, power) in [(17, 0.6), (18, 1.6)] {
         let mut flowing = record(seed, |_, _| TAU_S, |_, stiffness| stiffness);
-        let mut random = uniform(seed + 10);
+        let mut random = Lcg64::new(seed + 10);
         let mut level = 0.0f64;
         for row in &mut flowing.rows {
-            let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+            let noise = random.normal();
             row.measured = Some(level + noise);
             for _ in 0..STEPS {
                 level +=

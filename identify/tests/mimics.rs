@@ -1,6 +1,7 @@
 //! Causes that can stand in for each other are named each for itself.
 
 use identify::{Input, Options, Report, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
@@ -45,8 +46,8 @@ const PAPER: Spring = Spring {
 
 /// The report on a record of held levels with noise of 1 V.
 fn report(spring: &Spring, levels: &[f64]) -> Report {
-    let mut random = uniform(1);
-    let mut uniform = move || random() - 0.5;
+    let mut numbers = Lcg32::new(1);
+    let mut uniform = move || numbers.uniform() - 0.5;
     let (mut play, mut lag, mut slow, mut leak) = (0.0f64, 0.0, 0.0, 0.0);
     let follow =
         |state: &mut f64, target: f64, tau_s: f64| *state += (target - *state) * -f64::exp_m1(-SAMPLE_S / tau_s);
@@ -158,23 +159,15 @@ fn readings_that_are_cut_off_leave_a_gain_a_gain() {
     assert_eq!(causes(&spring, &LEVELS), ["gain-error", "quantisation", "voltage-dependent-time-constant"]);
 }
 
-/// Numbers from 0 to 1.
-fn uniform(mut state: u32) -> impl FnMut() -> f64 {
-    move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 24)
-    }
-}
-
 /// Voltages of at least `rows` rows: ramps between random levels in up to `ramp` rows, most of them followed by a rest of up to `rest`.
-fn ramps(rows: usize, [ramp, rest]: [f64; 2], mut uniform: impl FnMut() -> f64) -> Vec<f64> {
+fn ramps(rows: usize, [ramp, rest]: [f64; 2], numbers: &mut Lcg32) -> Vec<f64> {
     let mut volts = vec![0.0; 20];
     while volts.len() < rows + 20 {
-        let (from, to) = (volts[volts.len() - 1], (500.0 * uniform()).round());
-        let rows = 4.0 + ((ramp - 4.0) * uniform() * uniform()).round();
+        let (from, to) = (volts[volts.len() - 1], (500.0 * numbers.uniform()).round());
+        let rows = 4.0 + ((ramp - 4.0) * numbers.uniform() * numbers.uniform()).round();
         volts.extend((1..=rows as usize).map(|row| from + (to - from) * row as f64 / rows));
-        if uniform() < 0.6 {
-            volts.extend(vec![to; (6.0 + (rest - 6.0) * uniform()) as usize]);
+        if numbers.uniform() < 0.6 {
+            volts.extend(vec![to; (6.0 + (rest - 6.0) * numbers.uniform()) as usize]);
         }
     }
     volts
@@ -200,15 +193,15 @@ fn a_delay_and_a_lag_in_series_are_no_share_that_reverses() {
     const STEPS: usize = 50;
     let late = (0.95 / ROW_S * STEPS as f64).round() as usize;
     for seed in 1..=3 {
-        let mut uniform = uniform(seed);
-        let volts = ramps(900, [100.0, 80.0], &mut uniform);
+        let mut numbers = Lcg32::new(seed);
+        let volts = ramps(900, [100.0, 80.0], &mut numbers);
         let volts_at = |step: usize| {
             let (row, part) = (step / STEPS, (step % STEPS) as f64 / STEPS as f64);
             volts[row] + part * (volts[row + 1] - volts[row])
         };
         let (mut lag, mut series) = (0.0, 0.0);
         let readings = (0..900).map(|row| {
-            let reading = series + 2.0 * (uniform() + uniform() + uniform() - 1.5);
+            let reading = series + 2.0 * (numbers.uniform() + numbers.uniform() + numbers.uniform() - 1.5);
             for step in row * STEPS..(row + 1) * STEPS {
                 let across_v = volts_at(step.saturating_sub(late));
                 lag += (across_v - lag) * ROW_S / STEPS as f64 / PAPER.tau_s;
@@ -228,11 +221,11 @@ fn with_gain_and_bound(seed: u32, tau_s: impl Fn(f64) -> f64) -> Report {
     const ROW_S: f64 = 0.2;
     const STEPS: usize = 20;
     const ROWS: usize = 2400;
-    let mut uniform = uniform(seed);
-    let volts = ramps(ROWS, [130.0, 100.0], &mut uniform);
+    let mut numbers = Lcg32::new(seed);
+    let volts = ramps(ROWS, [130.0, 100.0], &mut numbers);
     let mut lag = 0.0;
     let readings = (0..ROWS).map(|row| {
-        let noise = 2.0 * (uniform() + uniform() + uniform() - 1.5);
+        let noise = 2.0 * (numbers.uniform() + numbers.uniform() + numbers.uniform() - 1.5);
         let reading = 1.125 * (PAPER.share * volts[row] + (1.0 - PAPER.share) * lag) + noise;
         for step in 0..STEPS {
             let part = (step as f64 + 0.5) / STEPS as f64;

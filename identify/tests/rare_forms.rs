@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use identify::answer::Parameter;
 use identify::{Options, Report, Verdict, examine};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 2000;
@@ -35,17 +36,13 @@ fn diagnosed_from(
     tau_s: impl Fn(usize) -> f64,
     mut read: impl FnMut(usize, f64, f64) -> f64,
 ) -> Report {
-    let mut seed = 11u32;
-    let mut random = || {
-        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(seed >> 8) / f64::from(1 << 24)
-    };
+    let mut random = Lcg32::new(11);
     // Proportional gain 0.1, integral gain 0.2 per s.
     let share = 0.1 / 1.1;
     let (mut voltage_v, mut across_v, mut lag) = (0.0, 0.0, 0.0);
     let row = |row: usize| {
         if row % 60 == 20 {
-            let part = if row == 20 { 1.0 } else { random() };
+            let part = if row == 20 { 1.0 } else { random.uniform() };
             voltage_v = (lowest_v + (FULL_SCALE_V - lowest_v) * part).round();
         }
         // The first reading after a step has its feedthrough.
@@ -54,7 +51,7 @@ fn diagnosed_from(
             across_v = amplified_v(voltage_v, across_v);
             lag += (across_v - lag) * SAMPLE_S / STEPS as f64 / tau_s(row);
         }
-        let noise = (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let noise = random.normal();
         let measured = Some(read(row, response, noise));
         Row { line: row + 2, time_s: SAMPLE_S * row as f64, voltage_v, measured }
     };

@@ -1,6 +1,7 @@
 //! A spring whose restoring force is far from linear is explained by that force.
 
 use identify::{Options, Report, Verdict, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 const ROWS: usize = 1200;
@@ -16,20 +17,16 @@ const ROUNDS: usize = 20;
 /// Diagnoses the paper's spring with the restoring force `y (1 + bend ((y / 500 V)^2 - 1))` under steps to random levels, with noise of
 /// 1 V.
 fn report(bend: f64) -> Report {
-    let mut seed = 3u32;
-    let mut random = || {
-        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(seed >> 8) / f64::from(1 << 24)
-    };
+    let mut random = Lcg32::new(3);
     let more = |y: f64| bend * y * ((y / FULL_SCALE_V).powi(2) - 1.0);
     let stiffness =
         |lag: f64, voltage_v: f64| (0..ROUNDS).fold(lag, |y, _| SHARE * (voltage_v - more(y)) + (1.0 - SHARE) * lag);
     let (mut voltage_v, mut lag) = (0.0, 0.0);
     let row = |row: usize| {
         if row >= 25 && row % 20 == 5 {
-            voltage_v = (FULL_SCALE_V * random()).round();
+            voltage_v = (FULL_SCALE_V * random.uniform()).round();
         }
-        let measured = stiffness(lag, voltage_v) + (0..12).map(|_| random() - 0.5).sum::<f64>();
+        let measured = stiffness(lag, voltage_v) + random.normal();
         for _ in 0..STEPS {
             let driven = voltage_v - more(stiffness(lag, voltage_v));
             lag += (driven - lag) * SAMPLE_S / STEPS as f64 / TAU_S;

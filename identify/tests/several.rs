@@ -1,6 +1,7 @@
 //! Several records of one spring are diagnosed together.
 
 use identify::{Diagnosis, Options, Verdict, diagnose, examine_several};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 /// Time between rows, in s.
@@ -26,13 +27,10 @@ const PLAIN: Test =
 /// A record of a spring with a static gain and a time constant, in s.
 fn record(name: &str, gain: f64, tau_s: f64, test: &Test) -> Record {
     let share = 1.0 / 11.0;
-    let (mut lag_v, mut state) = (test.start_v, name.len() as u32);
+    let (mut lag_v, mut numbers) = (test.start_v, Lcg32::new(name.len() as u32));
     let mut row = |index: usize| {
         let voltage_v = test.volts[index / 100];
-        let mut uniform = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
-        };
+        let mut uniform = || numbers.uniform() - 0.5;
         let noise_v = test.noise_v * (uniform() + uniform() + uniform());
         let stiffness_v = gain * (share * voltage_v + (1.0 - share) * lag_v) + test.zero_v + 2.0 * noise_v;
         lag_v = voltage_v + (lag_v - voltage_v) * f64::exp(-SAMPLE_S / tau_s);

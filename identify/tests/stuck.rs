@@ -4,18 +4,18 @@ use std::ops::Range;
 
 use identify::answer::{Report, Verdict};
 use identify::{Options, diagnose};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 /// A stair of 100 V each 10 s up and down, twice, with a time constant of `tau_s`, an instantaneous part of 1/11 and noise of about 1 V.
 fn record(tau_s: f64) -> Record {
-    let (mut state, mut random) = (0.0, 1u32);
+    let (mut state, mut numbers) = (0.0, Lcg32::new(1));
     let rows = (0..2200).map(|index: usize| {
         let level = index / 100 % 11;
         let voltage_v = 100.0 * level.min(10 - level) as f64;
         let measured = voltage_v / 11.0 + state * 10.0 / 11.0;
         state += (voltage_v - state) * (1.0 - (-0.1 / tau_s).exp());
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let noise = 3.4 * (f64::from(random >> 8) / f64::from(1 << 24) - 0.5);
+        let noise = 3.4 * (numbers.uniform() - 0.5);
         Row { line: index + 2, time_s: 0.1 * index as f64, voltage_v, measured: Some(measured + noise) }
     });
     Record { name: "stair".into(), rows: rows.collect() }

@@ -3,6 +3,7 @@
 use identify::answer::Judge;
 use identify::dimension::significant;
 use identify::{Diagnosis, Options, Report, Verdict, examine};
+use random_numbers::Lcg32;
 use simulation::record::{Record, Row};
 
 const SAMPLE_S: f64 = 0.2;
@@ -11,11 +12,10 @@ const ROWS_PER_LEVEL: usize = 100;
 /// A record of a spring with the paper's time constant whose settled stiffness is that at another voltage; `error` is a further
 /// error of each row as a function of its number, voltage and lag.
 fn diagnosed(levels: &[f64], settled: impl Fn(f64) -> f64, error: impl Fn(usize, f64, f64) -> f64) -> Diagnosis {
-    let (mut lag_v, mut state) = (settled(levels[0]), 5u32);
+    let (mut lag_v, mut numbers) = (settled(levels[0]), Lcg32::new(5));
     let row = |index: usize| {
         let voltage_v = levels[index / ROWS_PER_LEVEL];
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let noise = 2.0 * (f64::from(state >> 8) / f64::from(1 << 24) - 0.5);
+        let noise = 2.0 * (numbers.uniform() - 0.5);
         let stiffness = settled(voltage_v) / 11.0 + lag_v * 10.0 / 11.0;
         let measured = Some(stiffness + noise + error(index, voltage_v, lag_v));
         lag_v = settled(voltage_v) + (lag_v - settled(voltage_v)) * f64::exp(-SAMPLE_S / 5.5);

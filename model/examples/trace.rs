@@ -6,16 +6,14 @@
 use std::io::{self, BufWriter, Write};
 
 use model::{Amplifier, Compensation, Config, Gains, Input, Plant, Settings, State, Volts, units::Signal};
+use random_numbers::Xorshift64;
 
-/// Random numbers by xorshift (Marsaglia, 2003).
-struct Random(u64);
+/// Random settings and targets.
+struct Random(Xorshift64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
+        self.0.draw()
     }
 
     /// A number from 0 to 1, sometimes one of the ends.
@@ -23,7 +21,7 @@ impl Random {
         match self.bits() % 16 {
             0 => 0.0,
             1 => 1.0,
-            _ => (self.bits() >> 11) as f64 / (1u64 << 53) as f64,
+            _ => self.0.uniform(),
         }
     }
 
@@ -76,7 +74,7 @@ fn main() -> io::Result<()> {
     let mut arguments = std::env::args().skip(1).map(|text| text.parse::<u64>().expect("a whole number"));
     let mut next = || arguments.next().expect("expected SEED CONFIGURATIONS TICKS");
     let (seed, configurations, ticks) = (next(), next(), next());
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut random = Random(Xorshift64::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1));
     let mut out = BufWriter::new(io::stdout().lock());
     for _ in 0..configurations {
         // The spring's dead-beat gain may be below the gain that was drawn.

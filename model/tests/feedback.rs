@@ -4,18 +4,13 @@
 use model::feedback::{Fault, fault_detection};
 use model::{Config, Feedback, Input, Plant, Reading, ScaledStiffness, Sensor, Settings, State, Volts};
 use proptest::prelude::*;
+use random_numbers::Lcg64;
 
 mod reference;
 use reference::Reference;
 
 fn reading(read_v: f64, age: u16) -> Reading {
     Reading { stiffness: ScaledStiffness(Volts::new(read_v).unwrap().0), age }
-}
-
-/// Returns a random number from -1 to 1.
-fn uniform(random: &mut u64) -> f64 {
-    *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*random >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 fn with(feedback: Feedback) -> Settings {
@@ -67,10 +62,11 @@ proptest! {
         let feedback = Feedback { noise_v, model_uncertainty, fastest_s, interval_s, oldest_s, fade_s, ..typical };
         let config = Settings { rate_hz, ..with(feedback) }.validate().unwrap().quantize();
         let (mut state, mut reference) = (State::default(), Reference::new(&feedback, rate_hz));
-        let (mut model, mut random, mut sign, mut age) = (0.0, seed, 1.0, 0u16);
+        let (mut model, mut numbers, mut sign, mut age) = (0.0, Lcg64::new(seed), 1.0, 0u16);
         for (segment, ticks, target) in segments {
             for _ in 0..ticks {
-                let noise = uniform(&mut random);
+                // From -1 to 1.
+                let noise = 2.0 * numbers.uniform() - 1.0;
                 age = age.saturating_add(1);
                 let measured = match segment {
                     Segment::Absent => None,
@@ -239,11 +235,11 @@ fn a_stuck_sensor_is_detected_at_rest_and_earlier_while_the_model_moves() {
 /// Rounding as coarse as the settings allow: to twice the noise, starting from the middle of a step.
 #[test]
 fn a_sensor_that_rounds_to_twice_its_noise_stays_trusted() {
-    let (mut bench, mut random) = (Bench::settled(), 1u64);
+    let (mut bench, mut numbers) = (Bench::settled(), Lcg64::new(1));
     // Rounding to 2 V contributes 0.577 V of the noise of 1 V.
     let white_v = (1.0f64 - 4.0 / 12.0).sqrt();
     for tick in 0..100_000 {
-        let noise: f64 = (0..12).map(|_| uniform(&mut random)).sum::<f64>() / 2.0;
+        let noise = numbers.normal();
         let rounded = |bench: &Bench| Some(reading(2.0 * ((bench.truth() + white_v * noise) / 2.0).round(), 0));
         assert_eq!(bench.step(300.0, rounded), Some(Sensor::Trusted), "tick {tick}");
     }

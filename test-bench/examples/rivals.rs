@@ -20,9 +20,10 @@ use idsp::Build;
 use idsp::iir::{Biquad, BiquadClamp, DirectForm1, pid::Builder};
 use model::units::Signal;
 use model::{Config, Gains, Input, Output, Plant, Settings, State, Volts};
+use random_numbers::Xorshift32;
 use test_bench::mps2::instructions::{Counter, start_clock};
 use test_bench::mps2::semihosting;
-use test_bench::xorshift::Xorshift;
+use test_bench::target::volts;
 
 const SETTINGS: Settings = Settings::PAPER;
 const GAINS: Gains = Gains::PAPER;
@@ -57,18 +58,18 @@ fn main() -> ! {
 
 fn race(name: &'static str, contender: &mut dyn Contender) {
     let mut counter = Counter::begin();
-    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
-    let mut volts = 0.0;
+    let (mut numbers, mut target) = (Xorshift32::new(1), Volts::ZERO);
+    let mut reached_v = 0.0;
     for tick in 0..TICKS {
         if tick >= JUMPING {
             target = END;
         } else if tick % 50 == 0 {
-            target = numbers.target();
+            target = volts(numbers.draw());
         }
-        volts = contender.tick(target, &mut counter);
+        reached_v = contender.tick(target, &mut counter);
     }
     let counted = counter.instructions();
-    let end_mv = (volts * 1000.0) as i32;
+    let end_mv = (reached_v * 1000.0) as i32;
     defmt::info!(
         "rival name={=str} min={=u32} mean={=u32} max={=u32} end_mv={=i32}",
         name,

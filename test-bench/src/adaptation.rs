@@ -8,9 +8,9 @@ use firmware::settings::{SETTINGS, SUPERVISION, built_in, with_sensor};
 use link::Command;
 use model::units::Signal;
 use model::{OutOfRange, Volts, adaptation, supervisor};
+use random_numbers::Xorshift32;
 
 use crate::digest::Digest;
-use crate::xorshift::Xorshift;
 
 /// Number of ticks of the run.
 const TICKS: u32 = 90_000;
@@ -44,7 +44,7 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
     isolation.start(&terms);
     let mut planner = Planner::new(Terms::new(&settings, amplifier, &terms));
     let mut measured = None;
-    let (mut digest, mut numbers, mut exchanges) = (Digest::default(), Xorshift::new(1), 0);
+    let (mut digest, mut numbers, mut exchanges) = (Digest::default(), Xorshift32::new(1), 0);
     let mut gain = adaptation::Parameters::STORED.gain;
     for tick in 0..TICKS {
         let target = Volts(Signal::from_num(100 * (1 + tick / HOLD * 3 % 5)));

@@ -5,9 +5,10 @@ use firmware::control::{Stopwatch, whole_tick};
 use model::estimator::{Estimator, Model};
 use model::extended::{Law, Leakage, Memory, Relaxation};
 use model::{Approach, Compensation, ExtendedPlant, Gains, Input, Margin, OutOfRange, Plant, Settings, State, Volts};
+use random_numbers::Xorshift32;
 
 use crate::digest::Digest;
-use crate::xorshift::Xorshift;
+use crate::target::volts;
 
 /// Number of ticks of a run.
 const TICKS: u32 = 10_000;
@@ -66,10 +67,10 @@ const fn lags(count: usize, time_constant_high_s: Option<f64>) -> Relaxation<'st
 
 /// The inputs of a run: random targets.
 pub fn inputs() -> impl Iterator<Item = Input> {
-    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
+    let (mut numbers, mut target) = (Xorshift32::new(1), Volts::ZERO);
     (0..TICKS).map(move |tick| {
         if tick.is_multiple_of(TICKS_A_TARGET) {
-            target = numbers.target();
+            target = volts(numbers.draw());
         }
         Input { target, ..Input::default() }
     })

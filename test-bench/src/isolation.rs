@@ -7,9 +7,10 @@ use firmware::control::{Stopwatch, whole_tick};
 use model::isolation::{self, Verdict};
 use model::units::Signal;
 use model::{Input, OutOfRange, SampleTime, ScaledStiffness, Settings, State, Validate, Volts};
+use random_numbers::Xorshift32;
 
 use crate::digest::Digest;
-use crate::xorshift::{Xorshift, volts};
+use crate::target::volts;
 
 /// Number of ticks of the run. The target changes every 2500 ticks.
 const TICKS: u32 = 60_000;
@@ -39,7 +40,7 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
     let bank = isolation::Settings::PAPER.validate(SampleTime::from_rate(Settings::PAPER.rate_hz)?)?.quantize();
     let (mut state, mut watching) = (State::default(), isolation::State::default());
     let mut digest = Digest::default();
-    let (mut numbers, mut target) = (Xorshift::new(1), Volts::ZERO);
+    let (mut numbers, mut target) = (Xorshift32::new(1), Volts::ZERO);
     for tick in 0..TICKS {
         let drawn = numbers.draw();
         if tick.is_multiple_of(2500) {

@@ -11,7 +11,7 @@
 //! | [`isolation`] | A run of the isolation bank with the controller, for counting instructions. |
 //! | [`script`] | Commands and injected faults of every run. |
 //! | [`simulation`] | Execution of a script on a host, without a board. |
-//! | [`xorshift`] | Random numbers that are the same on every machine. |
+//! | [`target`] | Random target voltages. |
 //! | `mps2` | The emulated board. |
 //! | `player` | Execution of a script on the emulated board. |
 //!
@@ -30,7 +30,7 @@ pub mod digest;
 pub mod isolation;
 pub mod script;
 pub mod simulation;
-pub mod xorshift;
+pub mod target;
 
 #[cfg(feature = "mps2-an386")]
 pub mod mps2;

@@ -22,8 +22,7 @@ use firmware::settings::SETTINGS;
 use firmware::settings::with_sensor;
 use link::Command;
 use model::{Settings, Volts, supervisor};
-
-use crate::xorshift::Xorshift;
+use random_numbers::Xorshift32;
 
 /// Number of ticks of the stair, 70 s.
 pub const STAIR_TICKS: u32 = 70_000;
@@ -299,14 +298,14 @@ fn aftermath(tick: u32) -> Option<supervisor::Command> {
 pub struct Random {
     ticks: u32,
     first_tick: u64,
-    numbers: Xorshift,
+    numbers: Xorshift32,
     open_until: u32,
     silent_until: u32,
 }
 
 impl Random {
     const fn new(seed: u32, ticks: u32) -> Self {
-        Self { ticks, first_tick: 0, numbers: Xorshift::new(seed), open_until: 0, silent_until: 0 }
+        Self { ticks, first_tick: 0, numbers: Xorshift32::new(seed), open_until: 0, silent_until: 0 }
     }
 
     fn step(&mut self, tick: u32) -> Step {

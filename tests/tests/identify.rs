@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use end_to_end::vsj::{json, run, text};
+use random_numbers::Lcg32;
 use serde_json::Value;
 use tempfile::tempdir;
 
@@ -12,21 +13,15 @@ fn number(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} of {value}"))
 }
 
-/// Deterministic noise between -0.5 and 0.5.
-fn uniform(state: &mut u32) -> f64 {
-    *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-    f64::from(*state >> 8) / f64::from(1 << 24) - 0.5
-}
-
 /// A record in newtons with a gain of -0.02 N/V, a zero of 7 N, a share of 0.3 and a lag of 50 ms, by its exact recursion.
 fn record(zero: f64) -> String {
-    let (mut lag, mut voltage, mut state) = (0.0, 0.0, 5u32);
+    let (mut lag, mut voltage, mut numbers) = (0.0, 0.0, Lcg32::new(5));
     let mut text = "time_s,voltage_v,force\n".to_owned();
     for row in 0..600 {
         if row % 25 == 0 {
-            voltage = 400.0 * (uniform(&mut state) + 0.5);
+            voltage = 400.0 * numbers.uniform();
         }
-        let force = zero - 0.02 * (0.3 * voltage + 0.7 * lag) + 0.01 * uniform(&mut state);
+        let force = zero - 0.02 * (0.3 * voltage + 0.7 * lag) + 0.01 * (numbers.uniform() - 0.5);
         writeln!(text, "{},{voltage},{force}", 0.005 * f64::from(row)).unwrap();
         lag = voltage + (lag - voltage) * f64::exp(-0.005 / 0.05);
     }

@@ -4,19 +4,17 @@ use std::fmt::Write;
 use std::fs;
 
 use end_to_end::vsj::{json, run, text};
+use random_numbers::Xorshift32;
 use tempfile::tempdir;
 
 /// A record of the paper's spring at 100 rows per second between levels held for 7 s, whose gain changes after 40 s, with noise of a
 /// third of a volt.
 fn record(gain: f64) -> String {
     let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
-    let (mut relaxed, mut bits) = (0.0, 1u32);
+    let (mut relaxed, mut numbers) = (0.0, Xorshift32::new(1));
     for row in 0..14_000u32 {
         let voltage = [100.0, 400.0, 200.0, 500.0, 0.0, 300.0, 50.0][(row / 700) as usize % 7];
-        bits ^= bits << 13;
-        bits ^= bits >> 17;
-        bits ^= bits << 5;
-        let noise = (f64::from(bits) / f64::from(u32::MAX) - 0.5) * 12f64.sqrt() / 3.0;
+        let noise = (f64::from(numbers.draw()) / f64::from(u32::MAX) - 0.5) * 12f64.sqrt() / 3.0;
         let stiffness = (if row < 4000 { 1.0 } else { gain }) * (relaxed + (voltage - relaxed) / 11.0) + noise;
         writeln!(csv, "{:.2},{voltage},{stiffness:.3}", f64::from(row) / 100.0).unwrap();
         relaxed += (voltage - relaxed) * -f64::exp_m1(-0.01 / 5.5);

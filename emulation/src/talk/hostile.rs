@@ -3,23 +3,21 @@
 use std::ops::Range;
 
 use link::{Desired, Frame, Nonce, Reply, Request, Sequence, State, WireVolts};
+use random_numbers::Xorshift32;
 
 /// Number of frames in a run.
 pub(super) const HOSTILE: u32 = 10_000;
 
-/// A xorshift generator (Marsaglia, 13-17-5), so that every run has the same frames.
-pub(super) struct Dice(u32);
+/// Random choices, the same in every run.
+pub(super) struct Dice(Xorshift32);
 
 impl Dice {
     pub(super) const fn new(seed: u32) -> Self {
-        Self(seed)
+        Self(Xorshift32::new(seed))
     }
 
     fn draw(&mut self, range: Range<usize>) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 17;
-        self.0 ^= self.0 << 5;
-        range.start + (self.0 >> 4) as usize % (range.end - range.start)
+        range.start + (self.0.draw() >> 4) as usize % (range.end - range.start)
     }
 }
 
@@ -97,7 +95,7 @@ mod tests {
 
     #[test]
     fn no_hostile_frame_is_a_valid_request() {
-        let mut dice = Dice(7);
+        let mut dice = Dice::new(7);
         for index in 0..HOSTILE {
             let (session, next) = (Nonce(77), Sequence(index as u16));
             let mut receiver = Receiver::new();

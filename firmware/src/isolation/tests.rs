@@ -10,6 +10,7 @@ use link::{Command, IsolationReport};
 use model::isolation::{Cause, Causes, Report, Verdict};
 use model::supervisor::{self, Fault, State};
 use model::{Feedback, Plant, Settings, Volts, device};
+use random_numbers::Lcg32;
 
 use super::{Isolation, News, Terms};
 use crate::control::{Control, Sensors, Tick, Untimed};
@@ -30,7 +31,7 @@ pub(crate) struct Rig {
     pub(crate) gain: f64,
     slow_v: f64,
     measured: Option<Volts>,
-    random: u32,
+    numbers: Lcg32,
 }
 
 impl Rig {
@@ -40,7 +41,7 @@ impl Rig {
         let mut isolation = Box::new(Isolation::NEW);
         isolation.start(&terms);
         let control = Control::new(&settings.control, &settings.supervision, None).unwrap();
-        Self { control, isolation, terms, gain: 1.0, slow_v: 0.0, measured: None, random: 1 }
+        Self { control, isolation, terms, gain: 1.0, slow_v: 0.0, measured: None, numbers: Lcg32::new(1) }
     }
 
     /// One tick with a command and a target, in V.
@@ -55,8 +56,7 @@ impl Rig {
         // The reading is sampled after the voltage was applied, which then stays until the next tick.
         let stiffness_v = self.gain * (share * applied_v + (1.0 - share) * self.slow_v);
         self.slow_v = applied_v + (self.slow_v - applied_v) * (-1e-3 / time_constant_s).exp();
-        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let noise_v = f64::from(self.random) / 2f64.powi(32) * 0.6 - 0.3;
+        let noise_v = f64::from(self.numbers.draw()) / 2f64.powi(32) * 0.6 - 0.3;
         self.measured = Some(Volts::new(stiffness_v + noise_v).unwrap());
         (tick, news)
     }

@@ -4,6 +4,7 @@ use std::vec::Vec;
 
 use link::Block::{Model, Settings};
 use link::wire_model::MOST_PARTS;
+use random_numbers::Xorshift32;
 
 use super::*;
 
@@ -300,14 +301,11 @@ fn an_invalid_or_incomplete_model_is_not_stored() {
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn random_pages_contain_no_model() {
-    let mut bits = 1u32;
+    let mut numbers = Xorshift32::new(1);
     for round in 0..200 {
         let mut flash = Flash::BLANK;
         for byte in flash.pages.iter_mut().flatten() {
-            bits ^= bits << 13;
-            bits ^= bits >> 17;
-            bits ^= bits << 5;
-            *byte = bits as u8;
+            *byte = numbers.draw() as u8;
         }
         if round % 2 == 0 {
             flash.pages[0][..4].copy_from_slice(&mark(Model));

@@ -26,6 +26,7 @@ use link::{
 use model::adaptation::Phase;
 use model::stiffness::{Cantilever, YoungsModulus};
 use model::{Spring, device, supervisor};
+use random_numbers::Xorshift64;
 use serialport::{SerialPort, TTYPort};
 
 /// Properties of the MCU and its line.
@@ -231,7 +232,7 @@ impl Mcu {
     fn run(&mut self, setup: Setup, mut exchange: impl FnMut(&mut [u8], Option<&[u8]>) -> usize + Send + 'static) {
         let (shared, stop) = (self.shared.clone(), self.stop.clone());
         self.thread = Some(std::thread::spawn(move || {
-            let mut noise = Noise { one_in: setup.damage_one_in, state: 0x2545_F491_4F6C_DD1D };
+            let mut noise = Noise { one_in: setup.damage_one_in, numbers: Xorshift64::new(0x2545_F491_4F6C_DD1D) };
             let mut chip = Chip::new(setup, shared);
             let mut start = Instant::now();
             let mut out = Vec::new();
@@ -447,19 +448,16 @@ impl Chip {
 /// Damage on the line, the same in every run.
 struct Noise {
     one_in: Option<u32>,
-    state: u64,
+    numbers: Xorshift64,
 }
 
 impl Noise {
     fn spoil(&mut self, bytes: &mut [u8]) {
         let Some(one_in) = self.one_in else { return };
         for byte in bytes {
-            // xorshift
-            self.state ^= self.state << 13;
-            self.state ^= self.state >> 7;
-            self.state ^= self.state << 17;
-            if (self.state >> 8).is_multiple_of(u64::from(one_in)) {
-                *byte ^= 1 << (self.state & 7);
+            let drawn = self.numbers.draw();
+            if (drawn >> 8).is_multiple_of(u64::from(one_in)) {
+                *byte ^= 1 << (drawn & 7);
             }
         }
     }

@@ -92,16 +92,13 @@ fn changed(errors: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::record::input::Input;
+    use random_numbers::Lcg64;
     use simulation::record::{Record, Row};
 
     /// Independent errors of unit variance, nearly normal.
     fn errors(rows: usize) -> Vec<f64> {
-        let mut state = 7u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        (0..rows).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+        let mut numbers = Lcg64::new(7);
+        (0..rows).map(|_| numbers.normal()).collect()
     }
 
     fn place_of(of_row: impl Fn(f64) -> f64) -> Option<String> {

@@ -1,5 +1,6 @@
 use std::f64::consts::TAU;
 
+use random_numbers::Lcg32;
 use simulation::record::Row;
 
 use super::*;
@@ -242,10 +243,9 @@ fn plant_file_has_no_negative_share_that_is_not_shown() {
 #[test]
 fn readings_that_repeat_because_no_new_one_came_are_left_out() {
     let mut lossy = record(600, 3000, 0.0, 1.0);
-    let (mut state, mut lost) = (1u32, 0);
+    let (mut numbers, mut lost) = (Lcg32::new(1), 0);
     for row in 1..lossy.rows.len() {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        if state >> 31 == 1 {
+        if numbers.draw() >> 31 == 1 {
             lossy.rows[row].measured = lossy.rows[row - 1].measured;
             lost += 1;
         }

@@ -276,6 +276,7 @@ fn reason(rows: &[(usize, f64, f64)], new: &[usize], changes: &[f64]) -> Reason 
 mod tests {
     use super::*;
     use crate::stats::scale::normals;
+    use random_numbers::Lcg32;
     use simulation::record::Row;
 
     const ROWS: usize = 2000;
@@ -293,12 +294,11 @@ mod tests {
 
     /// The same under the voltage of each row.
     fn driven(voltage_v: impl Fn(usize) -> f64, noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
-        let (mut state, mut before, mut random) = (0.0, 0.0, 1u32);
+        let (mut state, mut before, mut numbers) = (0.0, 0.0, Lcg32::new(1));
         let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
             let voltage_v = voltage_v(row);
             state += (voltage_v - state) / 30.0;
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            before = read(before, state + noise_v * noise, f64::from(random >> 8) / f64::from(1 << 24));
+            before = read(before, state + noise_v * noise, numbers.uniform());
             Row { line: row, time_s: 0.1 * row as f64, voltage_v, measured: Some(before) }
         });
         Record { name: String::new(), rows: rows.collect() }
@@ -377,11 +377,11 @@ mod tests {
     /// The response hardly rests, so that one number of rows says little of the next, and changes are of many sizes.
     #[test]
     fn reports_of_a_response_that_hardly_rests_are_no_lost_readings() {
-        let (mut state, mut before, mut random, mut voltage_v) = (0.0, 0.0, 1u32, 0.0);
+        let (mut state, mut before, mut numbers, mut voltage_v) = (0.0, 0.0, Lcg32::new(1), 0.0);
         let row = |(row, noise): (usize, f64)| {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let drawn = numbers.draw();
             if row % 2 == 0 {
-                voltage_v = f64::from(random >> 30) * 100.0;
+                voltage_v = f64::from(drawn >> 30) * 100.0;
             }
             state += (voltage_v - state) / 5.0;
             let new: f64 = state + noise;

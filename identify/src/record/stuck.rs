@@ -416,6 +416,7 @@ mod tests {
     use super::*;
     use crate::record::held::{Held, Reason, held};
     use crate::stats::scale::normals;
+    use random_numbers::Lcg32;
     use simulation::record::Row;
 
     const ROWS: usize = 2000;
@@ -542,12 +543,12 @@ mod tests {
     /// Steps of 12 rows that never let a lightly damped spring rest, and one long rest, read in steps of 0.5 V; with noise of the readings
     /// and of the voltage that the file has, in V.
     fn paused(noise_v: f64, noise_of_voltage_v: f64) -> Record {
-        let (mut at, mut speed, mut random) = (0.0, 0.0, 1u32);
+        let (mut at, mut speed, mut drawn, mut numbers) = (0.0, 0.0, 1, Lcg32::new(1));
         let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {
             if row % 12 == 0 {
-                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                drawn = numbers.draw();
             }
-            let volts = if (900..1400).contains(&row) { 40.0 } else { f64::from(random >> 24) };
+            let volts = if (900..1400).contains(&row) { 40.0 } else { f64::from(drawn >> 24) };
             speed += 0.4 * (volts - at) - 0.25 * speed;
             at += speed;
             let measured = Some(((at + noise_v * noise) / 0.5).round() * 0.5);

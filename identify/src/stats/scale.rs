@@ -38,15 +38,9 @@ pub(crate) fn second_differences(reading: &[f64]) -> impl Iterator<Item = f64> {
     reading.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]) / 6f64.sqrt())
 }
 
-/// Returns independent, nearly normal numbers of unit variance: sums of twelve uniform numbers from splitmix64.
+/// Returns independent, nearly normal numbers of mean 0 and variance 1.
 #[cfg(test)]
 pub(crate) fn normals(rows: usize) -> Vec<f64> {
-    let mut state = 20_261_121u64;
-    let mut uniform = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..rows).map(|_| (0..12).map(|_| uniform() - 0.5).sum()).collect()
+    let mut numbers = random_numbers::SplitMix64::new(20_261_121);
+    (0..rows).map(|_| numbers.normal()).collect()
 }

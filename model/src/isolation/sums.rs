@@ -247,6 +247,7 @@ mod tests {
     use crate::isolation::Settings;
     use crate::units::{SampleTime, ScaledStiffness, Signal, Volts};
     use crate::validated::Validate;
+    use random_numbers::Xorshift32;
 
     fn config() -> Config {
         Settings::PAPER.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize()
@@ -296,13 +297,8 @@ mod tests {
     #[cfg_attr(miri, ignore = "slow under Miri")]
     fn a_quotient_of_two_short_divisions_is_that_of_a_long_one() {
         assert_eq!(quotient(i64::MAX >> 20, 0), 0);
-        let mut bits = 7u32;
-        let mut next = || {
-            bits ^= bits << 13;
-            bits ^= bits >> 17;
-            bits ^= bits << 5;
-            bits
-        };
+        let mut numbers = Xorshift32::new(7);
+        let mut next = || numbers.draw();
         for _ in 0..100_000 {
             let count = next() % 1024 + 1;
             let sum = (i64::from(next() as i32) >> (next() % 32)) * i64::from(count) + i64::from(next() % count);

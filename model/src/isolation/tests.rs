@@ -3,19 +3,12 @@ mod faults;
 use super::*;
 use crate::units::SampleTime;
 use crate::validated::Validate;
+use random_numbers::Xorshift32;
 
 fn config(rate_hz: f64) -> Config {
     let interval_s = f64::max(1e-3, 1.0 / rate_hz);
     let settings = Settings { interval_s, ..Settings::PAPER };
     settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize()
-}
-
-/// Xorshift generator of Marsaglia.
-fn next(bits: &mut u32) -> u32 {
-    *bits ^= *bits << 13;
-    *bits ^= *bits >> 17;
-    *bits ^= *bits << 5;
-    *bits
 }
 
 /// Returns a digest continued over further values: the FNV-1a hash, a value at a time.
@@ -73,9 +66,9 @@ fn the_noise_of_a_block_is_that_of_a_mean_of_correlated_readings() {
 fn no_input_overflows_and_garbage_is_not_named() {
     let ticks = if cfg!(miri) { 1500 } else { 400_000u32 };
     for rate_hz in [100.0, 1000.0, 10_000.0] {
-        let (config, mut state, mut bits) = (config(rate_hz), State::default(), 7u32);
+        let (config, mut state, mut numbers) = (config(rate_hz), State::default(), Xorshift32::new(7));
         let mut any = |wild: bool| {
-            let value = next(&mut bits) as i32;
+            let value = numbers.draw() as i32;
             if wild { value } else { value >> 4 }
         };
         for tick in 0..ticks {
@@ -97,12 +90,12 @@ fn no_input_overflows_and_garbage_is_not_named() {
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
-    let (config, mut state, mut bits) = (config(1000.0), State::default(), 7u32);
+    let (config, mut state, mut numbers) = (config(1000.0), State::default(), Xorshift32::new(7));
     let mut alarms = 0;
     for tick in 0..80_000u32 {
         let volts = [100, 300, 0, 200][(tick / 6000) as usize % 4];
         let level = Signal::from_num(volts);
-        let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+        let noise = Signal::from_bits((numbers.draw() & 0x3f_ffff) as i32 - 0x1f_ffff);
         let reading = if tick < 20_000 { level + noise } else { Signal::from_num(150) };
         config.tick(&mut state, Volts(level), ScaledStiffness(level), Some(ScaledStiffness(reading)));
         if tick < 20_000 {
@@ -123,11 +116,11 @@ fn a_stuck_sensor_is_named_and_an_acknowledged_alarm_comes_again() {
 #[test]
 #[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_gap_in_the_readings_is_a_part_of_the_time_since_the_fault_began() {
-    let (config, mut bits) = (config(1000.0), 7u32);
+    let (config, mut numbers) = (config(1000.0), Xorshift32::new(7));
     let (mut whole, mut gap) = (State::default(), State::default());
     for tick in 0..60_000u32 {
         let level = Signal::from_num([100, 300, 0, 200][(tick / 6000) as usize % 4]);
-        let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+        let noise = Signal::from_bits((numbers.draw() & 0x3f_ffff) as i32 - 0x1f_ffff);
         let offset = if tick < 20_000 { Signal::ZERO } else { Signal::from_num(20) };
         let reading = Some(ScaledStiffness(level + noise + offset));
         config.tick(&mut whole, Volts(level), ScaledStiffness(level), reading);
@@ -255,7 +248,7 @@ fn every_tick_is_the_same_to_the_bit() {
         (10_000.0, Settings { tolerance, noise_correlation_s: 0.05, ..paper }, 0x151a_7da7_b892_0832),
     ] {
         let config = settings.validate(SampleTime::from_rate(rate_hz).unwrap()).unwrap().quantize();
-        let (mut state, mut bits, mut all) = (State::default(), 7u32, 0xcbf2_9ce4_8422_2325u64);
+        let (mut state, mut numbers, mut all) = (State::default(), Xorshift32::new(7), 0xcbf2_9ce4_8422_2325u64);
         let mut slow = 0i64;
         // 3200 blocks of 128 ticks: beyond the number at which the sums are halved.
         let (fault, gap, end) = (20_000, 150_000..170_000, 409_600u32);
@@ -263,7 +256,7 @@ fn every_tick_is_the_same_to_the_bit() {
             let level = Signal::from_num([100, 300, 0, 650, 200][(tick / 4500) as usize % 5]);
             slow += (i64::from(level.to_bits()) - slow) >> 12;
             let model = Signal::from_bits((slow as i32 >> 1) + (level.to_bits() >> 1));
-            let noise = Signal::from_bits((next(&mut bits) & 0x3f_ffff) as i32 - 0x1f_ffff);
+            let noise = Signal::from_bits((numbers.draw() & 0x3f_ffff) as i32 - 0x1f_ffff);
             let error = if tick < fault { 0 } else { model.to_bits() >> 5 };
             let heard = tick % 5 != 0 && !gap.contains(&tick);
             let reading = heard.then(|| ScaledStiffness(Signal::from_bits(model.to_bits() + error) + noise));

@@ -10,6 +10,7 @@ use std::fs;
 use std::path::Path;
 
 use end_to_end::vsj::{run, text};
+use random_numbers::Lcg32;
 use tempfile::TempDir;
 
 /// Files that `--out` writes.
@@ -33,11 +34,11 @@ fn folder() -> TempDir {
 /// `error(row)`.
 fn papers(rows: u32, error: impl Fn(u32) -> f64) -> String {
     let mut csv = "time_s,voltage_v,stiffness\n".to_owned();
-    let (mut relaxed, mut noise) = (0.0, 1u32);
+    let (mut relaxed, mut numbers) = (0.0, Lcg32::new(1));
     for row in 0..rows {
         let voltage = [0.0, 400.0, 150.0, 500.0][row as usize / 100 % 4];
-        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let reading = relaxed + (voltage - relaxed) / 11.0 + f64::from(noise) / f64::from(u32::MAX) - 0.5 + error(row);
+        let reading =
+            relaxed + (voltage - relaxed) / 11.0 + f64::from(numbers.draw()) / f64::from(u32::MAX) - 0.5 + error(row);
         writeln!(csv, "{},{voltage},{reading}", 0.1 * f64::from(row)).expect("a string takes anything");
         relaxed += (voltage - relaxed) * (1.0 - (-0.1f64 / 5.5).exp());
     }

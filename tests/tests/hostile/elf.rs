@@ -2,6 +2,7 @@
 
 use end_to_end::defmt::{Firmware, Value};
 use end_to_end::vsj::text;
+use random_numbers::Xorshift32;
 
 use crate::attack::Class;
 
@@ -71,14 +72,8 @@ fn log(firmware: &Firmware) -> Vec<u8> {
 
 /// Bytes without order, the same in each run.
 fn noise(seed: u32, length: usize) -> Vec<u8> {
-    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        state as u8
-    };
-    (0..length).map(|_| next()).collect()
+    let mut numbers = Xorshift32::new(seed.wrapping_mul(2_654_435_761) | 1);
+    (0..length).map(|_| numbers.draw() as u8).collect()
 }
 
 /// A copy with bytes changed here and there.

@@ -7,6 +7,7 @@ use core::task::{Context, Poll, Waker};
 use std::vec;
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use random_numbers::Lcg32;
 use sequential_storage::cache::Cache;
 use sequential_storage::map::{MapConfig, MapStorage};
 
@@ -85,13 +86,13 @@ fn other_newest(flash: &Flash, block: Block) -> Option<Vec<u8>> {
 fn both_stores_keep_the_old_or_the_new_payload_and_agree_after_each_store() {
     const STORES: u8 = 20;
     const STEPS: usize = 80;
-    let mut random = 1u32;
+    let mut numbers = Lcg32::new(1);
     let (mut ours, mut theirs) = (Flash::BLANK, Flash::BLANK);
     // The last payload of each block.
     let mut last: [Option<Vec<u8>>; 2] = [None, None];
     let (mut cuts, mut kept, mut advanced) = (0, [0; 2], [0; 2]);
     for number in 1..=STORES {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let random = numbers.draw();
         let (block, untouched) = if random >> 31 == 0 { (Model, Settings) } else { (Settings, Model) };
         let length = 1 + (random >> 8) as usize % MOST_BYTES;
         let new: Vec<u8> = (0..length).map(|i| (i as u8).wrapping_mul(number)).collect();

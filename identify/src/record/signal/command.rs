@@ -182,6 +182,7 @@ fn chord(stretches: &[Stretch], blur_v: f64) -> Option<Piece> {
 mod tests {
     use super::*;
     use crate::record::signal::lag::Lag;
+    use random_numbers::Lcg32;
     use simulation::record::Record;
     use simulation::schedule::Between;
 
@@ -223,12 +224,8 @@ mod tests {
     /// Rows are 0.18 time constants apart, and every one has another voltage.
     #[test]
     fn two_pieces_a_row_change_two_lags_under_random_voltages_by_less_than_2_in_1000() {
-        let mut state = 1u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            500.0 * f64::from(state >> 8) / f64::from(1 << 24)
-        };
-        let (schedule, times) = every_second((0..2500).map(|_| random()));
+        let mut numbers = Lcg32::new(1);
+        let (schedule, times) = every_second((0..2500).map(|_| 500.0 * numbers.uniform()));
         let pieces = Signal::new(&schedule, &times, 0.0).pieces.len();
         assert!(pieces <= 2 * times.len(), "{pieces} pieces");
         for (taus_s, most_v) in [([5.5, 5.5], 0.1), ([5.5, 60.0], 0.02), ([1.0, 5.5], 0.9)] {

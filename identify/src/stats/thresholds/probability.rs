@@ -59,6 +59,7 @@ mod tests {
     use std::f64::consts::SQRT_2;
 
     use super::*;
+    use random_numbers::Lcg64;
 
     /// How a limit follows from a probability.
     pub(super) enum Rule {
@@ -91,11 +92,10 @@ mod tests {
         let mean = scores.iter().sum::<f64>() / count as f64;
         scores.iter_mut().for_each(|score| *score -= mean);
         let power: f64 = scores.iter().map(|score| score * score).sum();
-        let (mut permuted, mut state) = (scores.clone(), 1u64);
+        let (mut permuted, mut numbers) = (scores.clone(), Lcg64::new(1));
         let mut exceeds = || {
             for last in (1..count).rev() {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                permuted.swap(last, (((state >> 32) * (last as u64 + 1)) >> 32) as usize);
+                permuted.swap(last, (((numbers.draw() >> 32) * (last as u64 + 1)) >> 32) as usize);
             }
             let product: f64 = scores.iter().zip(&permuted).map(|(a, b)| a * b).sum();
             product / power * ((count - 1) as f64).sqrt() > limit

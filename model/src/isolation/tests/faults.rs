@@ -93,7 +93,7 @@ impl Spring {
 
 /// Runs the bank over a spring that becomes `faulty`. Returns what it says at the end, and a digest of all its decisions.
 fn watched(faulty: &Spring) -> (Verdict, f64, u64) {
-    let (config, mut state, mut bits) = (config(1000.0), State::default(), 11u32);
+    let (config, mut state, mut numbers) = (config(1000.0), State::default(), Xorshift32::new(11));
     let (mut nominal, mut real) = (At::default(), At::default());
     // FNV-1a, of whole numbers.
     let (mut decisions, mut digest) = (0, 0xcbf2_9ce4_8422_2325u64);
@@ -105,7 +105,7 @@ fn watched(faulty: &Spring) -> (Verdict, f64, u64) {
         let spring = if since > 0 { faulty } else { &HEALTHY_SPRING };
         let clean = spring.tick(&mut real, u, f64::from(since) * 1e-3);
         // The sum of four uniform numbers, of 1 V standard deviation.
-        let noise: f64 = (0..4).map(|_| f64::from(next(&mut bits)) / 4_294_967_296.0 - 0.5).sum();
+        let noise: f64 = (0..4).map(|_| f64::from(numbers.draw()) / 4_294_967_296.0 - 0.5).sum();
         let held = spring.stuck || clean == spring.highest_reading_v;
         let reading = if held { clean } else { clean + 3f64.sqrt() * noise };
         let stiffness = |volts: f64| ScaledStiffness(Signal::from_num(volts));
