@@ -42,7 +42,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// As many places as the channel of the log has.
+    /// Number of places in the queue of the tests: that of the log's channel.
     const PLACES: usize = 16;
 
     #[test]

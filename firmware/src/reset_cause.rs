@@ -21,7 +21,7 @@ pub enum CrashRecord {
     None,
     /// The program was running without a fault until a reset that it did not cause.
     Running,
-    /// The same, with its output enabled.
+    /// The program was running without a fault, with its output enabled, until a reset that it did not cause.
     Armed,
     /// The host had requested a restart.
     Restart,

@@ -19,7 +19,7 @@ use crate::store::{Pages, Store};
 pub struct Loaded {
     /// Settings that run.
     pub settings: device::Settings,
-    /// Their identity, and that of the stored ones, even if their validation failed.
+    /// Identities of the settings that run and of those stored, even if the stored ones failed their validation.
     pub blocks: Blocks,
     /// Invalid field of the stored settings, or `format`, or which block is damaged; `None` if settings are valid and nothing is
     /// damaged.

@@ -35,7 +35,7 @@ impl Timing {
         Self { rate_hz, hang_ms, incomplete_ticks: rate_hz * stall_ms / 1000, first_tick: 0 }
     }
 
-    /// The same times, with ticks counted from `first_tick` on: a board that has run for weeks.
+    /// Returns these times with ticks counted from `first_tick` on, as on a board that has run for weeks.
     pub fn counted_from(self, first_tick: u64) -> Self {
         Self { first_tick, ..self }
     }

@@ -20,7 +20,7 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// This effect at another size, 0 for none to 1 for full size.
+    /// Returns the effect at another size, 0 for none to 1 for full size.
     pub fn at(&self, size: f64) -> Self {
         Self { size, ..self.clone() }
     }

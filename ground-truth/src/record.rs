@@ -74,13 +74,13 @@ impl LabelledRecord {
         Self::of(&spring, schedule, effects, noise, seed)
     }
 
-    /// This record's schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect sets
-    /// it.
+    /// Simulates the record's schedule, effects and noise with a spring whose instantaneous share is `share`, 0 to 1, unless an effect
+    /// sets it.
     pub fn with_share(&self, share: f64) -> Self {
         self.with_relaxation(share, [Further::default(); 2])
     }
 
-    /// The same record with another instantaneous share, see [`with_share`](Self::with_share), and with further lags.
+    /// Simulates the record with another instantaneous share, see [`with_share`](Self::with_share), and with further lags.
     pub fn with_relaxation(&self, share: f64, further: [Further; 2]) -> Self {
         let own = Spring { further, ..Spring::with(&self.effects) };
         let spring = if own.share == SHARE { Spring { share, ..own } } else { own };
@@ -100,7 +100,7 @@ impl LabelledRecord {
         Self { schedule, effects, noise, seed, readings }
     }
 
-    /// This record's schedule and noise with its effects at another size, 0 for none to 1 for full size.
+    /// Simulates the record's schedule and noise with its effects at another size, 0 for none to 1 for full size.
     pub fn at(&self, size: f64) -> Self {
         let effects = self.effects.iter().map(|effect| effect.at(size)).collect();
         Self::new(self.schedule.clone(), effects, self.noise, self.seed)

@@ -120,7 +120,7 @@ pub struct Equation {
     pub blocks: Vec<&'static str>,
     /// What each function and symbol in it is.
     pub definitions: Vec<String>,
-    /// Its parameters with their names.
+    /// Parameters of the equation with their names.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
     /// Root mean square error in free run, in the reading's unit.
@@ -222,11 +222,11 @@ pub struct Extended {
 /// A named cause.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// Its cause code.
+    /// Code of the cause.
     pub cause: &'static str,
     /// Probability of the cause, 0 to 1: against the best explanation without it, and against a law that no cause describes.
     pub probability: f64,
-    /// Its parameters with their names, in the order of the cause's page in the manual.
+    /// Parameters of the cause with their names, in the order of its page in the manual.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
     /// Root mean square error of the best fit without the cause, in the reading's unit; outliers are left out, but for their own finding.
@@ -250,11 +250,11 @@ impl Finding {
 /// A cause that comes close to a finding but is none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Suspect {
-    /// Its cause code.
+    /// Code of the cause.
     pub cause: &'static str,
     /// The other causes of the set in which it comes closest; empty if it is alone.
     pub with: Vec<&'static str>,
-    /// Its parameters with their names, in the order of the cause's page in the manual.
+    /// Parameters of the cause with their names, in the order of its page in the manual.
     #[serde(serialize_with = "by_name")]
     pub parameters: Vec<(String, Parameter)>,
     /// Root mean square error of the set without the cause, as `judge` measures it, in the reading's unit.
@@ -265,7 +265,7 @@ pub struct Suspect {
     pub nats_short: f64,
     /// How both errors were measured.
     pub judge: Judge,
-    /// Its probability, below 0.5, if the extended simulation contains it; none otherwise.
+    /// Probability of the cause, below 0.5, if the extended simulation contains it; none otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub probability: Option<f64>,
 }

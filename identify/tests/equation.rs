@@ -208,7 +208,7 @@ fn records_without_a_departure_have_no_equation() {
     }
 }
 
-/// The same record and spring in milliseconds and 10 mV have the same equation, with its parameters in these units.
+/// A record and its spring in milliseconds and 10 mV have the equation that they have in s and V, with its parameters in these units.
 #[test]
 fn scales_of_time_voltage_and_reading_change_no_equation() {
     let plain = by_direction(7);

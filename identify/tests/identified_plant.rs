@@ -14,7 +14,7 @@ fn record(rates: Rates, reading: fn(f64, [f64; 2]) -> f64, heights: [f64; 2]) ->
     record_from([0.0; 2], 5, rates, reading, heights)
 }
 
-/// The same from a state at the first row; the first step follows after some rows.
+/// A record of random steps as [`record`] makes, from a state at the first row; the first step follows after `first_step` rows.
 fn record_from(
     start: [f64; 2],
     first_step: usize,

@@ -42,9 +42,9 @@ pub struct FaultRow {
     pub time_s: f64,
     /// Number of the tick in which the fault was seen.
     pub tick: u64,
-    /// Its name.
+    /// Name of the fault.
     pub fault: &'static str,
-    /// Its stable number.
+    /// Stable number of the fault.
     pub fault_code: u8,
     /// Names of all faults that stood when the report was sent.
     pub standing: Vec<&'static str>,

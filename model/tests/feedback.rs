@@ -24,9 +24,9 @@ enum Segment {
     Absent,
     /// The model's stiffness times a gain plus an offset, with noise of an amplitude, and the age in ticks.
     Fresh(f64, f64, f64, u16),
-    /// The same value in every tick.
+    /// One value, repeated in every tick.
     Stuck(f64),
-    /// The same sample, ageing.
+    /// One sample that gets older with each tick.
     Ageing(f64),
     /// The model's stiffness plus and minus an offset, alternating.
     Alternating(f64),

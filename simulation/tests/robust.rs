@@ -185,7 +185,7 @@ fn with_a_sensor_the_voltage_rises_by_20_v_in_a_millisecond() {
     }
 }
 
-/// The same law in double precision, written from its equations, on a plain and on an extended spring.
+/// The control law in double precision, written from its equations, gives the voltages of the tick, on a plain and on an extended spring.
 #[test]
 fn the_fixed_point_tick_agrees_with_double_precision() {
     let text = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = [2.0, 9.0]\nweights = [0.5, 0.4]\n\

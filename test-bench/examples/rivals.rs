@@ -122,7 +122,7 @@ impl Contender for WholeTick {
     }
 }
 
-/// The same tick in double precision, with precomputed constants.
+/// The whole tick of this controller in double precision, with precomputed constants.
 struct F64 {
     spring: Spring,
     integral: f64,

@@ -30,7 +30,7 @@ impl Firmware {
         self.elf_stamped("{=u64:us}")
     }
 
-    /// The same, with the format string of the times.
+    /// ELF file with the format strings and without code; `timestamp` is the format string of the times.
     pub fn elf_stamped(&self, timestamp: &str) -> Vec<u8> {
         let mut elf = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
         let section = elf.add_section(Vec::new(), b".defmt".to_vec(), SectionKind::Metadata);

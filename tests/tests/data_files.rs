@@ -40,7 +40,7 @@ fn every_example_of_the_page_on_data_files_prints_the_remarks_below_it_or_none()
     assert!(commands > 5, "{commands} commands");
 }
 
-/// The same record as its instrument might write it gives the same answer.
+/// A record as different instruments might write it gives one answer.
 #[test]
 fn a_diagnosis_does_not_depend_on_the_format_of_the_file() {
     let hidden = Recipe { rows: 600, ..Recipe::of(&[Cause::GainError]) }.draw(3);

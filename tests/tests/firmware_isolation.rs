@@ -62,7 +62,7 @@ fn run(change: Happens, trip_on_cause: Causes) -> Run {
     run_with(change, trip_on_cause, false)
 }
 
-/// As [`run`], with the adaptation if `adapts`.
+/// Runs controller and bank in closed loop with a spring that changes, as [`run`] does, with the adaptation if `adapts`.
 fn run_with(change: Happens, trip_on_cause: Causes, adapts: bool) -> Run {
     let settings = settings(trip_on_cause);
     settings.check().unwrap();

@@ -44,7 +44,7 @@ fn a_gain_that_changes_is_named_with_size_and_beginning_and_nothing_is_not() {
     assert_eq!(sound["last"]["verdict"], "quiet");
 }
 
-/// The same record with another header and other units, read by the options of the other commands, gives the same answer.
+/// A record with another header and other units, read by the options of the other commands, gives the answer of the plain one.
 #[test]
 fn a_record_in_any_columns_and_units_gives_the_same_answer() {
     let folder = tempdir().unwrap();

@@ -9,7 +9,7 @@ use end_to_end::vsj::{run, text, vsj};
 use simulation::record::{MEASURED, Record};
 use xtask::documents::{self, Line};
 
-/// Its examples, refusals among them, are run by `data_files.rs`.
+/// The page whose examples, refusals among them, are run by `data_files.rs` and not here.
 const HAS_A_TEST: &str = "docs/data-files.md";
 /// Names of choices in sentences, and one of them.
 const CHOICES: [(&str, &str); 3] = [("SHELL", "bash"), ("MODEL", "zener"), ("KEY=PERCENT", "tau=5")];

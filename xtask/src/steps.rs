@@ -50,7 +50,7 @@ impl Step {
         Self { program: Program::Emulation, ..Self::new(name, args) }
     }
 
-    /// The same with a variable of its environment.
+    /// Returns this step with a variable of its environment.
     pub(crate) const fn with(self, key: &'static str, value: &'static str) -> Self {
         Self { env: Some((key, value)), ..self }
     }

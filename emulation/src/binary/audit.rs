@@ -14,9 +14,9 @@ use super::thumb::Code;
 
 /// Beginning and end of the demangled name of the function that must not panic.
 const TICK: (&str, &str) = ("firmware::control::Control", "tick");
-/// The same of the isolation bank, in an image that contains it.
+/// Beginning and end of the demangled name of the isolation bank's tick, which must not panic in an image that contains it.
 const ISOLATION: (&str, &str) = ("firmware::isolation::enabled::Isolation", "tick");
-/// The same of the adaptation.
+/// Beginning and end of the demangled name of the adaptation's step after each tick, which must not panic either.
 const ADAPTATION: (&str, &str) = ("firmware::adaptation::shared", "after_tick");
 /// The tick of the C library.
 const C_TICK: &str = "vsj_tick";

@@ -15,9 +15,9 @@ use super::{elf, stack};
 const MOST_FLASH: u32 = 128 << 10;
 /// Most bytes of RAM that any image may use, stack included.
 const MOST_RAM: u32 = 16 << 10;
-/// The same for an image with the isolation bank.
+/// Most bytes of RAM that an image with the isolation bank may use, stack included.
 const MOST_RAM_ISOLATION: u32 = 24 << 10;
-/// The same for an image with the adaptation.
+/// Most bytes of RAM that an image with the adaptation may use, stack included.
 const MOST_RAM_ADAPTATION: u32 = 32 << 10;
 
 /// Further bytes of RAM for the robust controller: a second spring, and the stack on which it is built.

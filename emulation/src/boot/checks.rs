@@ -26,12 +26,12 @@ pub(super) struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// The same check of a run with another number of faults.
+    /// Returns this check for a run in which `faults` faults are injected.
     fn with_faults(self, faults: usize) -> Self {
         Self { faults, ..self }
     }
 
-    /// The same check of a run that depends on controller or amplifier.
+    /// Returns this check for a run that depends on controller or amplifier more than on the rest of the image.
     fn of_variant(self) -> Self {
         Self { is_of_variant: true, ..self }
     }

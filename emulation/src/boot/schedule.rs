@@ -59,7 +59,8 @@ impl Schedule {
         self.then(100_000, Request::Heartbeat);
     }
 
-    /// As JSON: time in us and bytes in hex. The session is the first of a chip whose generator delivers `random`.
+    /// Returns the frames of the schedule as JSON, each with its time in us and its bytes in hex. The session is the first
+    /// of a chip whose generator delivers `random`.
     pub(super) fn frames(&self, random: u32) -> Value {
         let nonce = Nonces::new(random).draw();
         let mut frames: Vec<(u32, String)> = Vec::new();

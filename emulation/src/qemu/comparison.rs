@@ -42,7 +42,7 @@ impl Comparison {
         Self::after_each(name, found, measured, run, |_, _| ())
     }
 
-    /// As [`Comparison::with`]; on the host `each` is called after each tick.
+    /// Runs the script `name` as [`Comparison::with`] does, and calls `each` after each tick on the host.
     pub(crate) fn after_each(
         name: &str,
         found: Option<&WireModel>,

@@ -53,7 +53,7 @@ enum Readings {
     None,
     /// The estimate with noise, and an offset.
     Good(i32),
-    /// The same value in every tick.
+    /// One value, repeated in every tick.
     Stuck(Signal),
     /// Any bits.
     Wild,

@@ -43,8 +43,9 @@ struct Said {
 #[derive(Clone, Debug, PartialEq)]
 struct Cause {
     name: String,
-    /// Its size, and the upper end of the interval.
+    /// Size of the cause, as the bank states it.
     size: f64,
+    /// Upper end of the interval of the size.
     high: f64,
     explained: f64,
 }

@@ -51,7 +51,8 @@ impl Interval {
         self.half() / self.value.abs()
     }
 
-    /// The same of an instantaneous share. One that is known to be next to nothing is known well, whatever its relative error.
+    /// Half the width of the interval of an instantaneous share, relative to its value. A share that is known to be next to nothing
+    /// is known well, whatever its relative error.
     fn relative_of_share(&self) -> f64 {
         let is_negligible = self.low.abs().max(self.high.abs()) < NEGLIGIBLE;
         if is_negligible { self.relative().min(LARGEST) } else { self.relative() }
@@ -90,7 +91,8 @@ pub(super) fn errors(option: &str, given: &[ErrorOf], identified: Option<&Path>)
     }
 }
 
-/// The same errors, those of a file up to a largest one; that of a share that is not known to 90 % of itself is a part of the response.
+/// The errors of the file `identified`, at most `largest` each, or without one those that an option gives; each relative to its parameter,
+/// but that of a share that is not known to 90 % of itself, which is a part of the response.
 ///
 /// # Errors
 /// [`simulation::BadInput`] for another error that is negative or too large, and for a file that is no identification.

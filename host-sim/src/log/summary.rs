@@ -63,7 +63,7 @@ pub struct Summary {
 pub struct Fault {
     /// Number of the fault.
     pub code: u8,
-    /// Its name.
+    /// Name of the fault.
     pub name: String,
     /// Number of occurrences.
     pub count: u64,

@@ -23,7 +23,7 @@ pub struct Ticks<'a, P> {
     pub experiment: &'a Experiment<P>,
     /// The run.
     pub run: &'a Run,
-    /// Those of its samples that are written.
+    /// The samples of the run that are written.
     pub samples: &'a [Sample],
     /// Spring that gives Young's modulus.
     pub spring: &'a Spring,

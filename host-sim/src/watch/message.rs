@@ -37,9 +37,9 @@ pub enum Event {
 /// Progress of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Playing {
-    /// Time since its start, in s.
+    /// Time since the schedule's start, in s.
     pub elapsed_s: f64,
-    /// Its length, in s.
+    /// Length of the schedule, in s.
     pub length_s: f64,
 }
 

@@ -99,7 +99,7 @@ fn status_shows_the_brown_out_level_of_a_board_that_has_one() {
     assert!(text.contains("brown-out  level 0, expected 4: "), "{text}");
 }
 
-/// Its program refuses what it does not know.
+/// An older program refuses requests that it does not know.
 #[test]
 fn the_status_of_an_older_program_shows_what_it_knows() {
     let mcu = Mcu::on_socket(Setup { is_older: true, brown_out: Some(BROWN_OUT), ..Setup::default() });

@@ -62,7 +62,7 @@ impl UnmodelledDynamics {
         Self { place, share, rms, whitened: false, doubtful: true, significant: true }
     }
 
-    /// The same in a whitened residual.
+    /// Structure in a whitened residual that is certain: doubtful and significant.
     pub(crate) fn certain_in_whitened(place: String, share: f64, rms: f64) -> Self {
         Self { whitened: true, ..Self::certain(place, share, rms) }
     }

@@ -35,8 +35,8 @@ const LONGEST_INITIAL: f64 = 3.0;
 /// Product of the two time constants of an overdamped second order, as a fraction of the square of their sum: the smallest,
 /// at initial points, and the largest, at which they are equal. Sum and product change the response smoothly also there.
 const PRODUCTS: [f64; 3] = [0.01, 0.2, 0.25];
-/// The same of a damped second order, `1 / (4 zeta^2)`: the smallest, near that of two equal time constants, at initial points, and
-/// the largest, of a damping ratio of 0.5.
+/// Product of the time constants of a damped second order as a fraction of the square of their sum, `1 / (4 zeta^2)`: the smallest, near
+/// that of two equal time constants, at initial points, and the largest, of a damping ratio of 0.5.
 const PRODUCTS_IF_DAMPED: [f64; 3] = [0.2501, 0.45, 1.0];
 
 /// Largest lag, or sum of two, relative to the time constant of a first-order fit if the nominal spring is far from the record: a
@@ -223,7 +223,7 @@ mod tests {
         data.voltage_v.iter().map(follow).collect()
     }
 
-    /// Also where time constants are equal, which have no partial fractions.
+    /// The prediction is that of an integrator also where time constants are equal, which have no partial fractions.
     #[test]
     fn prediction_is_that_of_an_integrator() {
         let (data, base) = (data(), Base::paper());

@@ -30,7 +30,8 @@ pub(super) fn lag(signal: &mut Signal, tau_s: f64) {
     signal.pass(|piece| lag.pass(piece));
 }
 
-/// The same with a time constant that varies; it is taken as constant within a piece.
+/// Passes a signal through a lag of unit gain whose time constant varies, from rest at the signal's first value; the time constant
+/// is taken as constant within a piece.
 pub(super) fn varying(signal: &mut Signal, tau_s: f64, by: By, a: f64, scale: &Scale) {
     let mut state = signal.before;
     let part = |value: f64| value / scale.full_v;

@@ -36,7 +36,7 @@ pub struct Problem<'a> {
     pub data: &'a Data,
     /// How its readings were taken.
     pub observed: &'a Observed,
-    /// Its scales.
+    /// Scales of the record.
     pub scale: Scale,
     input: Signal,
     time_s: Vec<f64>,

@@ -25,15 +25,15 @@ use simulation::plant_file::PlantFile;
 pub struct Rivals<'a> {
     /// The simulation as it is given, normalised.
     pub nominal: &'a PlantFile,
-    /// Its residual.
+    /// Residual of the simulation as it is given.
     pub nominal_residual: &'a [f64],
     /// The extended simulation, normalised.
     pub extended: &'a PlantFile,
-    /// Its residual.
+    /// Residual of the extended simulation.
     pub extended_residual: &'a [f64],
     /// Denominator and delay of the best linear model, in s.
     pub poles: &'a Poles,
-    /// Its residual.
+    /// Residual of the best linear model.
     pub linear_residual: &'a [f64],
 }
 

@@ -85,7 +85,7 @@ const MOST_JUMPS: usize = 30;
 pub struct Approach {
     /// The model.
     pub model: Model,
-    /// Its log-likelihood under the law of the fit, in nats.
+    /// Log-likelihood of the model under the law of the fit, in nats.
     pub log_likelihood: f64,
     /// True if a further round would gain nothing.
     pub settled: bool,

@@ -14,9 +14,9 @@ const STEP: f64 = 1e-5;
 pub(super) struct ReadingMap {
     /// Zero, in V, and gain, relative to those of the nominal spring.
     here: [f64; 2],
-    /// Their derivatives by each fitted coordinate.
+    /// Derivatives of zero and gain by each fitted coordinate.
     slopes: Vec<[f64; 2]>,
-    /// Their covariance at given coordinates.
+    /// Covariance of zero and gain at given coordinates.
     covariance: [[f64; 2]; 2],
 }
 

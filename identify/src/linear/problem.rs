@@ -507,7 +507,7 @@ impl Problem {
         self.linearised_on(&self.paths(poles.delay), poles)
     }
 
-    /// The same on voltages that are already delayed.
+    /// Fits as [`linearised`](Self::linearised) does, on voltages that are already delayed.
     fn linearised_on(&self, paths: &[Path], poles: Poles) -> Fit {
         let responses = self.responses(paths, &poles.sections);
         let fit = self.fitted(paths, &responses, poles);

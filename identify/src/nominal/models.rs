@@ -59,9 +59,9 @@ pub(super) struct Model {
 /// The best linear model of some records.
 #[derive(Clone, Debug)]
 pub struct BestLinear {
-    /// Its denominator and delay.
+    /// Denominator and delay of the model.
     pub poles: Poles,
-    /// Its order and errors.
+    /// Order and errors of the model.
     pub error: LinearError,
     /// Readings less predictions by fits without the segment, in the reading's unit.
     pub held_out: Vec<f64>,

@@ -23,7 +23,7 @@ pub struct TimeConstant {
     /// The time constant, in s.
     #[serde(flatten)]
     pub tau: Quantity,
-    /// Its part of the static gain; parts of opposite sign are an overshoot.
+    /// Part of the static gain that relaxes with the time constant; parts of opposite sign are an overshoot.
     pub weight: Quantity,
 }
 
@@ -34,7 +34,7 @@ pub struct Oscillation {
     pub freq_hz: Quantity,
     /// Damping ratio, 0 to 1.
     pub zeta: Quantity,
-    /// Its part of the static gain.
+    /// Part of the static gain that the pair has.
     pub weight: Quantity,
     /// Weight of its rate of change, divided by the angular frequency, relative to the static gain.
     pub rate_weight: Quantity,
@@ -141,11 +141,11 @@ pub struct Report {
     pub input_law: InputLaw,
     /// Root mean square of the free-running error, in the reading's unit.
     pub rmse: f64,
-    /// The same on held-out segments; with several records, on held-out records.
+    /// Root mean square of the free-running error on held-out segments, with several records on held-out records, in the reading's unit.
     pub held_out_rmse: f64,
-    /// The same on the last 40 % of each record, by a fit of this structure to the first 60 %.
+    /// Root mean square error on the last 40 % of each record, by a fit of this structure to the first 60 %, in the reading's unit.
     pub last_40_percent_rmse: f64,
-    /// The same as `held_out_rmse` of gain and zero alone.
+    /// Root mean square error on held-out segments of gain and zero alone, in the reading's unit.
     pub static_held_out_rmse: f64,
     /// The best linear models of order 1 to 4.
     pub linear: Vec<LinearError>,

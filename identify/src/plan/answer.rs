@@ -100,7 +100,7 @@ pub struct Sharper {
     pub cause: String,
     /// Name of the parameter.
     pub parameter: String,
-    /// Its value, in `unit`.
+    /// Value of the parameter, in `unit`.
     pub value: f64,
     /// Half of the interval of the diagnosis, in `unit`; `None` if the record does not determine it.
     pub now: Option<f64>,

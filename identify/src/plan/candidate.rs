@@ -57,7 +57,7 @@ pub(super) struct Segment {
 /// A schedule that the search varies.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Candidate {
-    /// Its segments, without the rest before and the return to 0 V after them.
+    /// Segments of the schedule, without the rest before and the return to 0 V after them.
     pub(super) segments: Vec<Segment>,
     /// Duration of the hold at 0 V at the end, as a weight like those of the segments.
     pub(super) tail: f64,

@@ -187,7 +187,7 @@ mod tests {
     use simulation::record::{Record, Row};
 
     const ROWS: usize = 900;
-    /// This row is just after a step.
+    /// Row just after a step at which the record is cut.
     const CUT: usize = 302;
 
     fn record(rows: impl Iterator<Item = usize>, reading: impl Fn(usize) -> f64) -> Record {

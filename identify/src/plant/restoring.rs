@@ -153,14 +153,15 @@ mod tests {
         Signal::new(&Schedule::from_record(&record, Between::Hold), &times, 0.0)
     }
 
-    /// The response to it at its rows.
+    /// The response of a relaxation to the step, at the rows of the step.
     fn response(relaxation: &Relaxation) -> Vec<f64> {
         let mut signal = step();
         pass(relaxation, &law(), &mut signal, &mut InitialState::at_rest(), &[], None);
         signal.at_rows().collect()
     }
 
-    /// The same by Euler's method in steps of 1e-5 s, where `rates` are those of stiffness and velocity under a voltage.
+    /// The response to the step at its rows by Euler's method in steps of 1e-5 s, where `rates` are those of stiffness and velocity
+    /// under a voltage.
     fn by_euler(rates: impl Fn(f64, [f64; 2]) -> [f64; 2]) -> Vec<f64> {
         const STEPS: usize = 10_000;
         let (mut state, mut at_rows) = ([0.0; 2], Vec::new());

@@ -67,7 +67,7 @@ pub struct Data {
 /// One of several joined records.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Its rows among those of all records.
+    /// Rows of the record among those of all records.
     pub rows: Range<usize>,
     /// Time by which it was moved to follow the record before it, in s.
     pub shift_s: f64,

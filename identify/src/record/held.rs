@@ -56,11 +56,11 @@ pub enum Reason {
 /// What the held readings of a record show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
-    /// Why they were held.
+    /// Why readings were held.
     pub reason: Reason,
-    /// Their rows in the record.
+    /// Rows of the held readings in the record.
     pub rows: Vec<usize>,
-    /// Their fraction of all readings.
+    /// Fraction of all readings that were held, 0 to 1.
     pub fraction: f64,
     /// Smallest and median change between new readings, in the reading's unit.
     pub changes: [f64; 2],
@@ -287,12 +287,12 @@ mod tests {
         record_with(1.0, read)
     }
 
-    /// The same with another noise, in V.
+    /// A record under a stair whose readings `read` makes, with noise of `noise_v`, in V.
     fn record_with(noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
         driven(|row| 100.0 * (row / 200 % 4) as f64, noise_v, read)
     }
 
-    /// The same under the voltage of each row.
+    /// A record under `voltage_v` of each row whose readings `read` makes, with noise of `noise_v`, in V.
     fn driven(voltage_v: impl Fn(usize) -> f64, noise_v: f64, read: impl Fn(f64, f64, f64) -> f64) -> Record {
         let (mut state, mut before, mut numbers) = (0.0, 0.0, Lcg32::new(1));
         let rows = normals(ROWS).into_iter().enumerate().map(|(row, noise)| {

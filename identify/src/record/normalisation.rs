@@ -22,7 +22,7 @@ use crate::record::scales::{REFERENCE_TIME_CONSTANT_S, REFERENCE_VOLTAGE_V, Scal
 
 /// Ratio of the nominal time constant to the record's from which the record's is used.
 const FAR_TIME_CONSTANT: f64 = 3.0;
-/// The same for the full scale of the voltage and the gain.
+/// Ratio of the nominal full scale of the voltage, or gain, to the record's from which the record's is used.
 const FAR_SIZE: f64 = 10.0;
 /// Zero of the readings relative to their full scale from which the nominal spring is far off.
 const FAR_ZERO: f64 = 0.5;

@@ -31,10 +31,10 @@ pub struct Breadth {
 /// Forms of an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Forms {
-    /// Those that every search tries.
+    /// The forms that every search tries.
     #[default]
     Common,
-    /// The others, for a record in which those leave structure or several effects are found.
+    /// The other forms, for a record in which the common ones leave structure or several effects are found.
     Rare,
 }
 

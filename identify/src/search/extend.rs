@@ -43,7 +43,8 @@ impl<E: Evaluator> Search<'_, E> {
         fits
     }
 
-    /// The same in some forms; kept for the next pass, which differs in prices, or tries further forms, only.
+    /// First fits of all extensions in some forms, or of those by the effect `wanted`; kept for the next pass, which
+    /// differs in prices, or tries further forms, only.
     fn first_fits_of(&mut self, forms: Forms, node: &Fit, wanted: Option<usize>) -> Vec<Fit> {
         let model = &node.model;
         let mut kept = self.first_fits.get(&model.structure()).into_iter().flatten();

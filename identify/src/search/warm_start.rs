@@ -5,8 +5,8 @@ use crate::effects::model::Model;
 /// The result of a search on a part of the rows, or under another reading of them, from which another search starts.
 #[derive(Clone, Debug)]
 pub struct WarmStart {
-    /// Its best models, the best first.
+    /// Best models of the search, the best first.
     pub models: Vec<Model>,
-    /// Factor by which it multiplied prices, 1 or more.
+    /// Factor by which the search multiplied prices, 1 or more.
     pub penalty_factor: f64,
 }

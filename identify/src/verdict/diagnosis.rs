@@ -50,7 +50,7 @@ pub struct Diagnosis {
     pub(crate) zero_offsets: Vec<f64>,
     /// How each reading was taken: exact, at a bound or known up to an interval, on a quantisation grid, cut off.
     pub(crate) observed: Observed,
-    /// The same without the outliers of `extended`.
+    /// How each reading was taken, without the outliers of `extended`.
     pub(crate) regular: Observed,
     /// Readings less predictions of `extended` on held-out segments with searched places known, in the reading's unit.
     pub(crate) held_out_in_place: Vec<f64>,

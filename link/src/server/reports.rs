@@ -16,7 +16,7 @@ pub(super) struct Reports {
     standing: Faults,
     /// The faults of whose report the host has not heard.
     unheard: Faults,
-    /// Those of them whose report is still to be sent in this round.
+    /// The unheard faults whose report is still to be sent in this round.
     unsent: Faults,
     /// Number of faults since the start; it wraps around.
     number: u32,

@@ -133,7 +133,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Those of the stored model.
+    /// The parameters of the stored model: each ratio is 1.
     pub const STORED: Self = Self { time_constant: 1.0, share: 1.0, gain: 1.0 };
 
     /// Returns the spring with these parameters, but for its gain; `stored` is the stored model.

@@ -22,22 +22,22 @@ const MOST_TAKEOVERS: u8 = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
-    /// It waits for a cause that it can take over.
+    /// The adaptation waits for a cause that it can take over.
     #[default]
     Watching,
-    /// It moves a parameter.
+    /// The adaptation moves a parameter.
     Moving,
-    /// It has moved a parameter, and waits until the model has forgotten that it had another one.
+    /// The adaptation has moved a parameter, and waits until the model has forgotten that it had another one.
     Settling,
-    /// It has taken over a parameter, which is not confirmed yet.
+    /// The adaptation has taken over a parameter, which is not confirmed yet.
     Trial,
     /// The sensor is not trusted, or the bank suspects it: nothing moves.
     Frozen,
-    /// It goes back to earlier parameters.
+    /// The adaptation goes back to earlier parameters.
     Returning,
-    /// It has gone back, and does nothing until [`State::switch`] is called.
+    /// The adaptation has gone back, and does nothing until [`State::switch`] is called.
     Stopped,
-    /// It is switched off, and the stored model runs.
+    /// The adaptation is switched off, and the stored model runs.
     Off,
 }
 

@@ -439,7 +439,7 @@ proptest! {
         }
     }
 
-    /// As [`Input`] without a gain.
+    /// Target and reading are divided by the gain, so that the tick runs a model without one.
     #[test]
     fn the_input_of_a_gain_is_divided_by_it(gain in 0.5..1.5f64, target in 0.0..1000.0f64, read in -500.0..1000.0f64) {
         let stiffness = |volts: f64| ScaledStiffness(Signal::from_num(volts));

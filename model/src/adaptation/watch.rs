@@ -13,7 +13,7 @@ pub struct Observation {
     pub report: Report,
     /// Distance between the lowest and the highest mean voltage of a block since the fault began, in V.
     pub moved: Volts,
-    /// The same since the last exchange, in V.
+    /// Distance between the lowest and the highest mean voltage of a block since the last exchange, in V.
     pub moved_since_exchange: Volts,
     /// Number of blocks since the sensor was not trusted last; saturates.
     pub trusted_blocks: u32,

@@ -41,7 +41,7 @@ pub const LEAKAGE: usize = 10;
 pub const LEAKAGE_SLOWER: usize = 11;
 /// Response to the distance of the narrowest play operator of [`PLAYS`] from `u`, for a width of the whole range.
 pub const PLAY: usize = 12;
-/// The same of the second play.
+/// Response to the distance of the second play operator of [`PLAYS`] from `u`, for a width of the whole range.
 pub const PLAY_SECOND: usize = 13;
 /// The vector of the second play minus that of the first.
 pub const PLAY_WIDER: usize = 14;
@@ -53,15 +53,15 @@ pub const LAW: usize = 16;
 pub const LAW_CUBIC: usize = 17;
 /// Response to the lack of a voltage that is held back above the first of [`LIMITS`], one range at the top.
 pub const LIMIT: usize = 18;
-/// The same for the second of [`LIMITS`], minus [`LIMIT`].
+/// Response to the lack of a voltage that is held back above the second of [`LIMITS`], minus [`LIMIT`].
 pub const LIMIT_MIDDLE: usize = 19;
-/// The same for the third of [`LIMITS`], minus [`LIMIT`].
+/// Response to the lack of a voltage that is held back above the third of [`LIMITS`], minus [`LIMIT`].
 pub const LIMIT_TOP: usize = 20;
 /// Response to the lag of a very fast slew, which is a pulse at each jump: `-sum(du |du|) / 2` per range.
 pub const SLEW: usize = 21;
 /// Response to the lag of a voltage with the first of [`SLEW_RATES`], times the rate in ranges per block.
 pub const SLEW_FIRST: usize = 22;
-/// The same for the second rate.
+/// Response to the lag of a voltage with the second of [`SLEW_RATES`], times the rate in ranges per block.
 pub const SLEW_SECOND: usize = 23;
 /// [`SLEW_FIRST`] minus [`SLEW`].
 pub const SLEW_FASTER: usize = 24;
@@ -95,7 +95,7 @@ pub const DELAY_TO_FOUR: usize = 37;
 pub const DELAY_TO_EIGHT: usize = 38;
 /// Low-pass of `y` with the first of [`LAG_TAUS`], minus `y`, times blocks per time constant.
 pub const LAG: usize = 39;
-/// The same for the second time constant.
+/// Low-pass of `y` with the second of [`LAG_TAUS`], minus `y`, times blocks per time constant.
 pub const LAG_SECOND: usize = 40;
 /// [`LAG`] minus [`DELAY`].
 pub const LAG_SHORTER: usize = 41;
@@ -128,7 +128,7 @@ pub const SLOW_TAUS: [f64; 2] = [3.0, 10.0];
 pub struct Hypothesis {
     /// The cause.
     pub cause: Cause,
-    /// Its vectors, the principal one last: its coefficient is the size in units of [`super::Settings::unit`].
+    /// The vectors that span its residuals, the principal one last: its coefficient is the size in units of [`super::Settings::unit`].
     pub vectors: &'static [usize],
     /// Smallest possible size.
     pub lowest: f64,

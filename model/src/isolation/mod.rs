@@ -63,13 +63,13 @@ pub enum Verdict {
     /// The readings agree with the model.
     #[default]
     Quiet,
-    /// They do not, and the cause is not known yet.
+    /// The readings do not agree with the model, and the cause is not known yet.
     Alarm,
-    /// One cause explains them, and no other does.
+    /// One cause explains the readings, and no other does.
     Named(Cause),
-    /// At least these two explain them; the first leaves least.
+    /// At least these two causes explain the readings; the first leaves least.
     Ambiguous(Cause, Cause),
-    /// No cause of the bank explains them.
+    /// No cause of the bank explains the readings.
     Unknown,
 }
 
@@ -292,7 +292,7 @@ impl Default for State {
 const WHITEN: u32 = 25;
 const TEST: u32 = 49;
 const ASSESS: u32 = TEST + sequential::STEPS;
-/// Its last steps, the longest, are not in the ticks that add up the sums.
+/// First tick of the steps that add up the products; the last of them, the longest, are not in the ticks that add up the sums.
 const ADD: u32 = 55;
 const CLOSE: u32 = ADD + products::STEPS as u32;
 /// First tick of the steps of a decision, which takes about 17 blocks with the 30 that are left in a block of 128 ticks.

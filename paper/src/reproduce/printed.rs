@@ -6,7 +6,7 @@ use serde::Deserialize;
 /// A printed number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printed {
-    /// Its value.
+    /// Value of the number, in the unit of its table.
     pub value: f64,
     /// Digits after the decimal point, before the exponent.
     pub decimals: usize,

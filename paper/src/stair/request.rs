@@ -15,7 +15,7 @@ use super::{Report, Rows};
 pub enum Target<'a> {
     /// The report's stair, with its 0.1 s ramps, in steps of [`PlantFile::stair_step_v`].
     Stair,
-    /// The same stair as ideal steps.
+    /// The report's stair as ideal steps, without the ramps.
     Step,
     /// The voltages of a record.
     Record(&'a Record, Between),

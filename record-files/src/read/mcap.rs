@@ -17,7 +17,7 @@ use super::{Cells, Columns};
 
 /// Column of the time at which a message was logged, in s.
 const LOG_TIME: &str = "log_time [s]";
-/// The same column under the name of a time, for messages without one.
+/// Name of the column of the time at which a message was logged, in s, if the messages have no time of their own.
 const TIME: &str = "time [s]";
 
 /// The field of an object that is a column: the keys that lead to it.

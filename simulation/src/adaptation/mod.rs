@@ -43,13 +43,13 @@ pub const MOST_OVERSHOOT_PERCENT: f64 = 2.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorFault {
-    /// It repeats its last reading.
+    /// The sensor repeats its last reading.
     Stuck,
-    /// It reads 20 V too much.
+    /// The sensor reads 20 V too much.
     Offset,
-    /// Its gain grows by 0.1 % in a second.
+    /// The gain of the sensor grows by 0.1 % in a second.
     Drift,
-    /// Its noise has four times the standard deviation.
+    /// The noise of the sensor has four times its standard deviation.
     Noise,
 }
 
@@ -93,9 +93,9 @@ pub struct Step {
     pub alone: Made,
     /// Time constant of the running model at the beginning of the step, as a ratio to the stored one.
     pub time_constant: f64,
-    /// The same of the share.
+    /// Instantaneous share of the running model at the beginning of the step, as a ratio to the stored one.
     pub share: f64,
-    /// The same of the gain.
+    /// Gain of the running model at the beginning of the step, as a ratio to the stored one.
     pub gain: f64,
     /// What the adaptation did at the end of the step.
     pub phase: &'static str,

@@ -52,7 +52,7 @@ impl<'a> Source<'a> {
         Self { numbering, ..Self::new(name, text) }
     }
 
-    /// The same source, in which any encoding but UTF-8 is an error.
+    /// Returns this source with any encoding but UTF-8 as an error.
     pub fn expect_utf_8(self) -> Self {
         Self { is_utf_8: true, ..self }
     }

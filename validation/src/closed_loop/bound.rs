@@ -28,13 +28,13 @@ const SETTLED_S: f64 = 60.0;
 pub struct Step {
     /// The spring when the step begins.
     pub live: Live,
-    /// Its effects.
+    /// Effects of the spring.
     pub effects: Vec<Effect>,
     /// Standard deviation of a reading, in V.
     pub noise_v: f64,
     /// Stiffness before the step, in V.
     pub from: f64,
-    /// Its target, in V.
+    /// Target of the step, in V.
     pub to: f64,
 }
 

@@ -19,11 +19,12 @@ const DIAGNOSIS: Duration = Duration::from_secs(300);
 /// Relative difference between numbers of the page and of the command: their functions in double precision (`exp`, `sin`) are of
 /// different libraries. The fixed-point tick has none.
 const ROUNDING: f64 = 1e-12;
-/// The same after a search, whose steps end when they gain little.
+/// Relative difference between results of a search on the page and in the command: its steps end when they gain little.
 const CONVERGENCE: f64 = 1e-5;
-/// The same between the numbers of steps of a search.
+/// Relative difference between the numbers of steps of a search on the page and in the command.
 const WORK: f64 = 0.04;
-/// The same between the largest errors of the fixed-point tick, whose rounding depends on the last digit of each parameter.
+/// Relative difference between the largest errors of the fixed-point tick on the page and in the command: its rounding depends on the
+/// last digit of each parameter.
 const OF_TICK: f64 = 1e-4;
 /// Longest time until something of the page is painted, in ms: of several loads the best, as other work may delay one.
 const PAINT_MS: f64 = 1000.0;

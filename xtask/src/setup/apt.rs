@@ -95,7 +95,7 @@ fn lock(message: &str) -> Option<&str> {
 mod tests {
     use super::*;
 
-    /// As apt 2.6 and 3.0 print it; the second line is for root alone.
+    /// The message of apt 2.6 and 3.0 that its lists are locked; the second line is for root alone.
     const HELD: &str = "E: Could not get lock /var/lib/apt/lists/lock. It is held by process 4711 (apt-get)";
 
     #[test]

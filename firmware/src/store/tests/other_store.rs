@@ -1,5 +1,5 @@
-//! The same stores and the same power cuts with the crate `sequential-storage`, which keeps key-value pairs in any number
-//! of pages: both must have the old or the new payload after each cut, and the same one after each completed store.
+//! Comparison of the store with the crate `sequential-storage`, which keeps key-value pairs in any number of pages, under the
+//! same power cuts: both must have the old or the new payload after each cut, and the same one after each completed store.
 
 use core::ops::Range;
 use core::pin::pin;

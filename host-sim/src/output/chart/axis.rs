@@ -42,7 +42,8 @@ impl Axis {
         self.ticks_apart(most, f64::INFINITY, |_| 0.0)
     }
 
-    /// As [`Axis::ticks`], so few that their labels do not touch: the axis is `room` long, and a label takes `extent` of it.
+    /// At most `most` ticks as of [`Axis::ticks`], so few that their labels do not touch: the axis is `room` long, and a label takes
+    /// `extent` of it.
     pub(super) fn ticks_apart(&self, most: usize, room: f64, extent: impl Fn(&str) -> f64) -> Ticks {
         let length = self.high - self.low;
         let magnitude = (length / most as f64).log10().floor() as i32;

@@ -28,7 +28,8 @@ const MOST_EQUAL_PIECES: f64 = 20.0;
 const STILL_FRACTION: f64 = 1e-4;
 /// Number of pieces for each row that is allowed.
 const PIECES_PER_ROW: f64 = 2.0;
-/// The same where the voltage changes at most rows: rows of a thirtieth of the time constant are then not divided.
+/// Number of pieces for each row that is allowed where the voltage changes at most rows: rows of a thirtieth of the time
+/// constant are then not divided.
 const PIECES_PER_CHANGE: f64 = 1.5;
 /// Largest factor by which the error of a chord grows with the coarseness.
 const MOST_BLUR: f64 = 16.0;

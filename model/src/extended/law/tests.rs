@@ -11,7 +11,7 @@ fn at(law: &Law<'_>, input: f64) -> f64 {
 }
 
 proptest! {
-    /// The same curve computed as a sum of changes of slope.
+    /// The law is the curve that a sum of changes of slope gives.
     #[test]
     fn the_law_is_linear_between_its_points(
         lines in prop::collection::vec((1.0..100.0f64, -2.0..2.0f64), 1..=8),

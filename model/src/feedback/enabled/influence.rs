@@ -127,7 +127,7 @@ mod tests {
         })
     }
 
-    /// The same while the model has moved by 100 V.
+    /// What each of these innovations adds to a correction in V, clipped and without delay, while the model has moved by 100 V.
     fn of<const N: usize>(is_quick: bool, correction: f64, innovations: [f64; N]) -> [(f64, f64); N] {
         after(100.0, is_quick, correction, innovations)
     }

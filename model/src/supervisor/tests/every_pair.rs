@@ -15,7 +15,7 @@ enum Was {
     Armed,
     /// Armed, with a silent host.
     Ramping,
-    /// The same, and the next tick of silence ends the ramp.
+    /// Armed, with a silent host; the next tick of silence ends the ramp.
     RampEnds,
     Faulted,
 }
@@ -101,7 +101,7 @@ enum Missed {
 enum Disagreed {
     No,
     Once,
-    /// As long as is allowed.
+    /// The monitors have disagreed for as long as is allowed.
     AsAllowed,
 }
 

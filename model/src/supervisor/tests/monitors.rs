@@ -195,7 +195,7 @@ fn named(driven_at: impl Fn(u32) -> f64, volts_at: impl Fn(u32) -> f64) -> Optio
     supervisor.mismatch()
 }
 
-/// Its voltage moves by 2.2 V or more, a sixteenth of the tolerance, within the second half of 50 ms.
+/// The voltage of an amplifier that is too slow moves by 2.2 V or more, a sixteenth of the tolerance, within the second half of 50 ms.
 #[test]
 fn an_amplifier_that_is_too_slow_is_distinguished_from_one_at_a_limit_or_with_another_scale() {
     let slewed = |from_v: f64, rate_v: f64| move |now: u32| from_v + rate_v * f64::from(now);

@@ -96,7 +96,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The same parabola in double precision.
+        /// The limit is the braking parabola in double precision.
         #[test]
         fn the_limit_is_the_braking_parabola(
             (share, weight, relaxation) in (0.01..0.3f64, 0.3..1.0f64, 1e-4..1e-2f64),

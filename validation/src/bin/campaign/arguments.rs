@@ -180,7 +180,7 @@ pub(crate) enum Part {
     Scales,
     /// One effect or none in a spring of one to three time constants, any scale, schedule and noise: 8 records of each cause
     Plants,
-    /// The same records without a plant file: the linear spring is identified, and what it leaves is diagnosed
+    /// Records of `plants` without a plant file: the linear spring is identified, and what it leaves is diagnosed
     Identified,
     /// Equations of unexplained records, compared with PySINDy and SysIdentPy: 1 record of each law of out-of-model and unforeseen
     Equation,
