@@ -31,6 +31,9 @@ pub fn execute<P: Pages>(
 
 /// Part `number` of the payload of `settings`, which is in RAM only meanwhile. What the chosen controller does not use is not
 /// kept, and has its default value here.
+///
+/// Nothing is read from the flash: the payload is made of settings that were validated at the start. The longest one fits, which a test
+/// of [`WireSettings`] shows; a longer one would be sent as no bytes, which are no settings, so that the host reports an error.
 #[inline(never)]
 pub fn settings_part(settings: &device::Settings, number: u8) -> Part {
     Part::of(number, &WireSettings::new(settings).payload().unwrap_or_default())
@@ -42,6 +45,8 @@ mod tests {
     use crate::settings::BUILT_IN;
     use crate::store::Memory;
     use link::{WireModel, frame};
+    use model::adaptation;
+    use model::isolation::{Cause, Causes, Tolerance};
 
     /// Sends a payload in parts and ends it; returns what each part and the end were answered.
     fn send(store: &mut Store<Memory>, block: Block, payload: &[u8]) -> Result<Option<BlockId>, Reason> {
@@ -67,5 +72,30 @@ mod tests {
             assert_eq!(send(&mut store, block, b"noise"), Err(Reason::Damaged), "{block:?}");
             assert_eq!(store.newest(block).map(|(id, _)| id), Some(id), "the old content remains");
         }
+    }
+
+    /// Of settings without and with the optional tables that every image can keep.
+    #[test]
+    fn parts_of_settings_are_their_whole_payload() {
+        let mut all = BUILT_IN;
+        all.control.amplifier.slew_v_per_s = Some(1e4);
+        all.trip_on_cause = Causes::NONE.with(Cause::GainError);
+        all.tolerance = Tolerance { time_constant: 0.01, share: 0.02, gain: 0.005 };
+        all.adaptation = Some(adaptation::Settings::TYPICAL);
+        for settings in [BUILT_IN, all] {
+            let (mut bytes, mut number) = (std::vec::Vec::new(), 0);
+            let length = loop {
+                let part = settings_part(&settings, number);
+                assert_eq!(part.number, number);
+                bytes.extend(part.bytes);
+                if bytes.len() >= usize::from(part.length) {
+                    break part.length;
+                }
+                number += 1;
+            };
+            bytes.truncate(usize::from(length));
+            assert_eq!(WireSettings::read(&bytes), Some(WireSettings::new(&settings)));
+        }
+        assert_eq!(WireSettings::read(&[]), None, "no bytes are no settings");
     }
 }
