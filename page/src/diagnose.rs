@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use identify::nominal::Identified;
-use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several};
+use identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify_with_order};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input;
 use simulation::csv_table::text::Source;
@@ -36,6 +36,9 @@ pub struct Records {
     pub plant: String,
     /// `quick`, `normal` or `thorough`.
     pub effort: String,
+    /// Order of the model of an identification, 1 to 4; `None` for the smallest that no larger one beats.
+    #[serde(default)]
+    pub order: Option<usize>,
 }
 
 /// One of the files.
@@ -147,7 +150,10 @@ pub fn identify(records: &Records, files: &[u8]) -> Result<Shown> {
     if read.input == Input::Stair {
         bad_input!("--input stair: expected hold or linear; the report's stair is for `vsj diagnose`");
     }
-    let found = read.identify()?;
+    let found = match records.order {
+        Some(order) => identify_with_order(&read.records, order, read.input, &read.units)?,
+        None => read.identify()?,
+    };
     let json = serde_json::to_string(&found.report)?;
     let drawn = found.records.iter().map(|course| {
         let model = less(&course.reading, &course.residual);

@@ -71,4 +71,34 @@ mod tests {
             assert!(error.starts_with("request: ") && !error.contains('\n'), "{error}");
         }
     }
+
+    /// Answers the identification of a first-order record of 200 rows with an order, as JSON.
+    fn identified(order: Value) -> Value {
+        let mut lag = 0.0;
+        let row = |row: u32| {
+            let voltage = f64::from(row / 20 * 7 % 5 * 100);
+            // Readings of a whole volt: the rounding is the noise.
+            let line = format!("{},{voltage},{}\n", f64::from(row) * 0.5, f64::round(0.1 * voltage + 0.9 * lag));
+            lag += (voltage - lag) * 0.1;
+            line
+        };
+        let file = "time_s,voltage_v,stiffness\n".to_owned() + &(0..200).map(row).collect::<String>();
+        let files = json!([{ "name": "r.csv", "length": file.len() }]);
+        let request = json!({
+            "command": "identify", "files": files, "input": "hold", "plant": "paper", "effort": "quick", "order": order
+        });
+        let said = answer(request.to_string().as_bytes(), file.as_bytes(), &Stop::default(), &mut |_| ());
+        serde_json::from_str(&said).unwrap()
+    }
+
+    #[test]
+    fn an_identification_has_the_order_that_is_asked_for() {
+        for order in 1..=3 {
+            let answer = identified(json!(order));
+            let report: Value = serde_json::from_str(answer["ok"]["json"].as_str().expect("an answer")).unwrap();
+            assert_eq!(report["order"], order, "{report}");
+        }
+        assert!(identified(Value::Null)["ok"].is_object());
+        assert_eq!(identified(json!(5))["error"], "order 5: expected 1 to 4");
+    }
 }

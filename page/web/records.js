@@ -100,6 +100,7 @@ export class RecordPanel {
       sort: byId("sort").checked,
       plant,
       effort: byId("effort").value,
+      order: Number(byId("order").value) || null,
     };
   }
 

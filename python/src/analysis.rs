@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ::identify::plan::{Basis, Request};
-use ::identify::{Diagnosis, Effort, Input, Options, Stop, examine_several};
+use ::identify::{Diagnosis, Effort, Input, Options, Stop, examine_several, identify_with_order};
 use anyhow::Result;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
@@ -57,12 +57,14 @@ fn plant_text(plant: &PlantFile, records: &Records) -> Result<String> {
     Ok(format!("# Identified from {}\n{}", names.join(", ").replace(['\n', '\r'], " "), plant.to_toml()?))
 }
 
-/// Identifies the linear spring of records.
+/// Identifies the linear spring of records, with a model of `order` if one is given.
 #[pyfunction]
+#[pyo3(signature = (records, options, order = None))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
     records: Vec<Given<'py>>,
     options: records::Options,
+    order: Option<i64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let records = copied(records);
     let answer = interrupt::run(py, &Stop::default(), move || {
@@ -71,7 +73,13 @@ pub(crate) fn identify<'py>(
             bad_input!("--input stair: expected hold or linear; the report's stair is for `vsj diagnose`");
         }
         let units = records.measured[0].units.clone();
-        let found = ::identify::identify(&records.rows(), records.input, &units)?;
+        let found = match order {
+            Some(order) => {
+                let Ok(order) = usize::try_from(order) else { bad_input!("order {order}: expected 1 or more") };
+                identify_with_order(&records.rows(), order, records.input, &units)?
+            }
+            None => ::identify::identify(&records.rows(), records.input, &units)?,
+        };
         let json = serde_json::to_string(&found.report)?;
         let plant = plant_text(&found.plant, &records)?;
         let course = |it: ::identify::nominal::Course| {

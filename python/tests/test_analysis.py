@@ -50,6 +50,24 @@ def test_identify_equals_the_command(command):
     every_field_is_there(found, json.loads(found.to_json()))
 
 
+def test_identify_with_an_order_equals_the_command(command):
+    for order in (1, 2, np.int64(3)):
+        found = vsj.identify(SAMPLE, order=order)
+        assert found.order == order
+        assert json.loads(found.to_json()) == json.loads(command("identify", SAMPLE, "--order", str(order), "--json"))
+
+
+def test_an_order_that_cannot_be_fitted_is_an_error():
+    for order, expected in ((-1, "1 or more"), (0, "1 to 4"), (5, "1 to 4"), (2**40, "1 to 4")):
+        with pytest.raises(vsj.BadInput, match=f"order {order}: expected {expected}"):
+            vsj.identify(SAMPLE, order=order)
+    few = np.column_stack([np.arange(20.0), np.repeat([0.0, 100.0], 10), np.linspace(0.0, 50.0, 20)])
+    with pytest.raises(vsj.BadInput, match="order 3: expected 1; a model of order 2 is not tried with fewer than 27 readings"):
+        vsj.identify(few, order=3)
+    with pytest.raises(TypeError):
+        vsj.identify(SAMPLE, order=1.5)
+
+
 def test_diagnose_equals_the_command(command, diagnosis):
     expected = json.loads(command("diagnose", SAMPLE, "--effort", "quick", "--json"))
     assert json.loads(diagnosis.to_json()) == expected

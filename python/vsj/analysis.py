@@ -15,6 +15,7 @@ Plant = Any
 def identify(
     data: Any,
     *,
+    order: Optional[int] = None,
     time: Optional[str] = None,
     voltage: Optional[str] = None,
     reading: Optional[str] = None,
@@ -34,6 +35,9 @@ def identify(
         The record: the path of a CSV, MCAP or Parquet file, a frame or a mapping with named columns, a structured array, three arrays
         of shape ``(n,)`` in the order time, voltage, reading, or an array of shape ``(n, 3)``. A list holds several records of one
         spring. NaN or null is a missing reading, in texts also what stands for one in a file, such as ``#N/A``.
+    order : int, optional
+        Order of the model, its number of poles: 1 to 4, as far as the readings allow. The voltage drives all poles of an order that is
+        given. Default: the smallest order that no larger one beats by more than its noise.
     time, voltage, reading : str, optional
         Column and unit, ``"NAME"`` or ``"NAME:UNIT"``, as of the command's options ``--time``, ``--voltage``, ``--reading``.
         Default: found by usual names and units.
@@ -57,10 +61,10 @@ def identify(
     Raises
     ------
     BadInput
-        With record, line, column and what was expected.
+        With record, line, column and what was expected; for an order that is not 1 to 4, or that needs more readings.
     """
     options = _options(time, voltage, reading, column, columns, separator, decimal, topic, sort, input)
-    answer = _vsj.identify(given(data, options), options)
+    answer = _vsj.identify(given(data, options), options, order)
     warn(answer["remarks"])
     return Identified._of(answer["json"], plant=answer["plant"], courses=answer["courses"])
 

@@ -251,6 +251,10 @@ impl Test {
         self.browser.choose("file", &record)?;
         self.browser.wait("document.getElementById('file-name').textContent.startsWith('sample')", CONTROL)?;
         self.browser.set("nominal", "paper")?;
+        self.browser.set("order", "2")?;
+        self.browser.click("identify")?;
+        same("identify", &self.found()?, &self.command(&["identify", name, "--order", "2"])?, CONVERGENCE)?;
+        self.browser.set("order", "")?;
         for command in ["identify", "diagnose"] {
             let begin = Instant::now();
             self.browser.click(command)?;
