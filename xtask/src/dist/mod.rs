@@ -2,10 +2,11 @@
 //!
 //! In: the sources as they are. Out: a folder and its archive with `vsj` for this host, its manual pages and completions, the library
 //! that `vsj export fmu` packs, the C library with its header for this host and for a Cortex-M4, the images of both boards for each
-//! controller and amplifier, the manual, the page for a browser, this version's changes, the licences of all dependencies, and the
+//! controller and amplifier, the Python package as a wheel, the manual, the page for a browser, this version's changes, the licences of all dependencies, and the
 //! SHA-256 of every file.
 
 mod licences;
+mod wheel;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,6 +41,7 @@ pub(crate) fn run() -> Result<()> {
     commands(&program, &new)?;
     libraries(&target, &program, &host, &new)?;
     images(&new.join("firmware"))?;
+    wheel::build(&target, &program, &new.join("python"))?;
     for text in TEXTS {
         files::copy(&shell::root().join(text), &new.join(text))?;
     }
@@ -47,7 +49,10 @@ pub(crate) fn run() -> Result<()> {
     copy_folder(&page::build()?, &new.join("page"))?;
     let changes = fs::read_to_string(shell::root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;
     files::write(&new.join("CHANGES.md"), section(&changes, version)?)?;
-    files::write(&new.join("THIRD-PARTY.txt"), licences::all(&["host-sim", "firmware", "test-bench", "page"])?)?;
+    files::write(
+        &new.join("THIRD-PARTY.txt"),
+        licences::all(&["host-sim", "firmware", "test-bench", "page", "vsj-python"])?,
+    )?;
     files::write(&new.join(CHECKSUMS), checksums(&new)?)?;
     files::remove(&folder)?;
     fs::rename(&new, &folder).with_context(|| format!("cannot write {}", folder.display()))?;
