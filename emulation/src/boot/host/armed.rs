@@ -5,10 +5,9 @@ use link::{Reply, Request};
 use xtask::variant::Variant;
 
 use super::answers::{answers, expect, greets};
-use super::codes::{control, differ, driven, drives, equal, orders, written};
+use super::codes::{control, differ, driven, drives, equal, inside, orders, written};
 use crate::boot::events::Events;
 use crate::boot::schedule::{self, TARGETS_V};
-use crate::variant;
 
 /// An error unless every answer is the expected one and every DAC code is the host's for `variant`. Returns a line for
 /// the report.
@@ -27,8 +26,7 @@ pub(in crate::boot) fn check(events: &Events, variant: Variant) -> Result<String
     let driven = driven(&on_host);
     ensure!(driven > 1000, "{driven} ticks with voltage show little");
     // Codes at the limit, or the same in every image, would not distinguish this image.
-    let highest = (1u16 << variant::settings(variant).amplifier.dac_bits) - 1;
-    let inside = on_host.iter().filter(|(code, enabled)| *enabled && (1..highest).contains(code)).count();
+    let inside = inside(&on_host, variant);
     ensure!(inside > 500, "{inside} codes inside of the range show little");
     let mut telling = usize::MAX;
     for other in variant.others() {

@@ -51,6 +51,12 @@ pub(super) fn driven(drives: &[(u16, bool)]) -> usize {
     drives.iter().filter(|(code, enabled)| *enabled && *code > 0).count()
 }
 
+/// Number of ticks whose code is between zero and the highest one of a variant: those at an end are the same for any model.
+pub(super) fn inside(drives: &[(u16, bool)], variant: Variant) -> usize {
+    let highest = (1u16 << variant::settings(variant).amplifier.dac_bits) - 1;
+    drives.iter().filter(|(code, enabled)| *enabled && (1..highest).contains(code)).count()
+}
+
 /// Number of ticks in which two runs differ.
 pub(super) fn differ(one: &[(u16, bool)], other: &[(u16, bool)]) -> usize {
     one.iter().zip(other).filter(|(one, other)| one != other).count()

@@ -7,7 +7,7 @@ use model::supervisor;
 use xtask::variant::Variant;
 
 use super::answers::{answers, expect, greets};
-use super::codes::{control, differ, driven, drives, equal, orders, written};
+use super::codes::{control, differ, driven, drives, equal, inside, orders, written};
 use crate::boot::events::{Events, JITTER_US, PERIOD_US, jitter};
 use crate::boot::schedule::{self, STORED_RESET_MS};
 use crate::variant;
@@ -65,7 +65,12 @@ pub(in crate::boot) fn sent(events: &Events, variant: Variant) -> Result<String>
     equal(&on_host, &written)?;
     let driven = driven(&on_host);
     let telling = differ(&drives(control(variant)?, &orders), &on_host);
-    ensure!(driven > 500 && telling > 500, "{driven} codes with voltage, {telling} others with the built-in spring");
+    // The time-optimal controller is at the end of the range for half of the time.
+    let inside = inside(&on_host, variant);
+    ensure!(
+        driven > 500 && inside > 300 && 10 * telling > 9 * inside,
+        "{driven} codes with voltage, {inside} inside of the range, {telling} others with the built-in spring"
+    );
     Ok(format!(
         "settings and a model with hysteresis, static law and two relaxations, {} and {} bytes in {programmed} words, no tick more than \
          {late:.2} us off its grid meanwhile; after the restart both run, a watchdog of {STORED_RESET_MS} ms instead of {WATCHDOG_MS} ms, \
