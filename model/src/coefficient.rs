@@ -149,7 +149,7 @@ pub(crate) fn sum(signal: Signal) -> Sum {
 /// signed.
 const fn halves(bits: i64) -> (i32, i32) {
     let high = (bits + (1 << 31)) >> 32;
-    (high as i32, (bits - (high << 32)) as i32)
+    (high as i32, bits as i32)
 }
 
 /// Returns the upper half of an accumulator, which is the same value rounded down to a signal.

@@ -68,7 +68,8 @@ impl Gains {
         // rings.
         let StepGain { feedthrough, in_one_tick, relaxation } = *spring;
         let ringing = in_one_tick - (1.0 - relaxation) * feedthrough;
-        let dead_beat = if ringing > 0.0 { (1.0 - relaxation) / ringing } else { f64::INFINITY };
+        // A spring that cannot ring takes any gain.
+        let dead_beat = (1.0 - relaxation) / ringing.max(f64::MIN_POSITIVE);
         dead_beat.min(100.0)
     }
 
