@@ -72,3 +72,69 @@ fn lowered_gains_are_accepted_for_every_spring() {
     let time = SampleTime::from_rate(1000.0).unwrap();
     assert_eq!(Gains::with_proportional(0.001, time), Gains { proportional: 0.001, integral_per_s: 0.1 });
 }
+
+/// A quantized law for the plain spring at 1 kHz, and the same numbers in double precision: `g` and the part of its distance that the
+/// integrator covers in a tick.
+fn law(proportional: f64, integral_per_s: f64, share: f64) -> (ProportionalIntegral, f64, f64) {
+    let time = SampleTime::from_rate(1000.0).unwrap();
+    let spring = Plant { share, time_constant_s: 5.5 }.largest_step_gain(time);
+    let gains = Gains { proportional, integral_per_s };
+    gains.check(&spring, time).unwrap();
+    let law = Validated::new(&gains, time).quantize(&spring);
+    (law, 1.0 / (1.0 + proportional * share), 1e-3 * integral_per_s / proportional)
+}
+
+fn volts(volts: f64) -> Volts {
+    Volts::new(volts).unwrap()
+}
+
+fn point(voltage_v: f64, stiffness_v: f64) -> OperatingPoint {
+    OperatingPoint { voltage: volts(voltage_v).0, stiffness: volts(stiffness_v).0 }
+}
+
+/// The voltage is `g z + (1 - g) v0 + g Kp (target - y0)`, and the integrator a lag of the voltage that was driven. A signal has steps
+/// of 1 uV, of which the largest gain here makes 20.
+#[test]
+fn voltage_and_integrator_are_those_of_the_law_in_double_precision() {
+    for (proportional, integral_per_s, share) in [(4.0, 1.35, 1.0 / 11.0), (0.5, 50.0, 0.5), (20.0, 100.0, 0.0)] {
+        let (law, g, part) = law(proportional, integral_per_s, share);
+        let (mut state, mut z) = (State::default(), 0.0);
+        for (target_v, v0, y0, driven_v) in
+            [(30.0, 200.0, 10.0, 500.0), (25.0, -40.0, 30.0, -80.0), (0.0, 0.0, 0.0, 300.0)]
+        {
+            let got = law.voltage(&state, volts(target_v), point(v0, y0)).to_f64();
+            let exact = g * z + (1.0 - g) * v0 + g * proportional * (target_v - y0);
+            assert!((got - exact).abs() < 3e-5, "{law:?}: {got} V, {exact} V");
+            law.track(&mut state, volts(driven_v));
+            z += part * (driven_v - z);
+        }
+    }
+}
+
+/// So that no product overflows: no amplifier has a larger range.
+#[test]
+fn an_error_is_limited_where_it_asks_for_1024_v_and_at_1024_v() {
+    for (proportional, share, within_v, most_v) in
+        [(20.0, 0.0, 51.0, 1024.0), (0.5, 0.0, 1023.0, 512.0), (4.0, 0.5, 767.0, 1024.0)]
+    {
+        let (law, g, _) = law(proportional, 0.0, share);
+        let asked =
+            |error_v: f64| law.voltage(&State::default(), volts(0.5 * error_v), point(0.0, -0.5 * error_v)).to_f64();
+        for sign in [-1.0, 1.0] {
+            let within = asked(sign * within_v);
+            assert!((within - sign * g * proportional * within_v).abs() < 3e-5, "{law:?}: {within} V");
+            let beyond = asked(sign * 2000.0);
+            assert!((beyond - sign * most_v).abs() < 3e-5, "{law:?}: {beyond} V");
+        }
+    }
+}
+
+#[test]
+fn a_preset_integrator_asks_for_the_last_voltage_again() {
+    let (law, ..) = law(4.0, 1.35, 1.0 / 11.0);
+    for (driven_v, target_v) in [(300.0, 150.0), (-20.0, 150.0), (700.0, 0.0)] {
+        let (mut state, point) = (State::default(), point(120.0, 100.0));
+        law.preset_integrator(&mut state, volts(driven_v), volts(target_v), point);
+        assert_eq!(law.voltage(&state, volts(target_v), point), volts(driven_v));
+    }
+}
