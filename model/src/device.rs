@@ -251,6 +251,21 @@ mod tests {
     }
 
     #[test]
+    fn the_isolation_bank_watches_the_spring_with_the_sensor_and_the_tolerance_of_the_device() {
+        let plant = Plant { share: 0.2, time_constant_s: 3.0 };
+        let tolerance = Tolerance::from_values([0.1, 0.2, 0.05]);
+        assert_eq!(Settings { tolerance, ..GOOD }.isolation(plant, 500.0), None);
+        if let Some(feedback) = crate::Feedback::from_values([2.0, 1.0, 0.1, 5e-3, 0.01, -50.0, 1000.0, 2.0]) {
+            let control = controller::Settings { feedback: Some(feedback), ..GOOD.control };
+            let bank = Settings { control, tolerance, ..GOOD }.isolation(plant, 500.0);
+            let usual = isolation::Settings::PAPER;
+            let expected =
+                isolation::Settings { plant, noise_v: 2.0, interval_s: 5e-3, range_v: 500.0, tolerance, ..usual };
+            assert_eq!(bank, Some(expected));
+        }
+    }
+
+    #[test]
     fn an_adaptation_needs_a_sensor_and_bounds_within_which_the_spring_can_be_run() {
         let with = |adaptation, feedback| {
             let control = controller::Settings { feedback, ..GOOD.control };

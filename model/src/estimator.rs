@@ -353,6 +353,51 @@ mod tests {
     }
 
     #[test]
+    fn one_tick_returns_the_stiffness_at_its_start_and_ends_at_the_predicted_one() {
+        let (config, applied) = (paper(100.0), Volts::new(300.0).unwrap());
+        let mut state = State::default();
+        for tick in 0..3 {
+            let predicted = config.predict(&state, applied);
+            assert_eq!(config.run(&mut state, applied).0, predicted.now, "tick {tick}");
+            assert_eq!(config.estimate(&state, applied).0, predicted.end, "tick {tick}");
+            assert!(predicted.now < predicted.end, "tick {tick}");
+        }
+    }
+
+    #[test]
+    fn a_differing_spring_has_the_multiplied_time_constant_and_share() {
+        let (plant, time) = (Plant { share: 0.25, time_constant_s: 4.0 }, SampleTime::from_rate(1000.0).unwrap());
+        let (quick, expected) = ((0.75, 1.5), Plant { share: 0.375, time_constant_s: 3.0 });
+        let differing = Plant::differing(plant.validate(time).unwrap(), quick, 0.17);
+        assert_eq!(differing.estimator, expected.validate(time).unwrap().quantize());
+        assert_eq!(differing.largest, expected.largest_step_gain(time));
+        assert_eq!(plant.check_differing(quick, time), Ok(()));
+        let rejected = |factors| plant.check_differing(factors, time).unwrap_err().field;
+        assert_eq!((rejected((1.0, 4.0)), rejected((4e-4, 1.0))), ("share", "time_constant_s"));
+    }
+
+    /// After the voltage that the inverse asks for, held for one tick, the stiffness has changed by as much as was wanted, to within
+    /// the rounding of a signal.
+    #[test]
+    fn the_inverse_asks_for_the_voltage_that_gives_the_wanted_change_at_the_end_of_a_tick() {
+        let time = SampleTime::from_rate(100.0).unwrap();
+        for (share, time_constant_s) in [(1.0 / 11.0, 5.5), (0.0, 0.05), (0.5, 0.02)] {
+            let plant = Plant { share, time_constant_s };
+            let valid = plant.validate(time).unwrap();
+            let config = valid.quantize();
+            let inverse = Plant::inverse(valid, &config, 0.17);
+            let (mut state, last) = (State::default(), Volts::new(100.0).unwrap());
+            config.run(&mut state, last);
+            for change_v in [20.0, -7.0] {
+                let change = Signal::from_num(change_v);
+                let voltage = config.voltage_for(&state, &inverse, last, change);
+                let got = config.predict(&state, voltage).end - config.predict(&state, last).end;
+                assert!((got - change).abs() < Signal::from_num(1e-5), "{plant:?}: {got} V, {change_v} V wanted");
+            }
+        }
+    }
+
+    #[test]
     fn a_setting_out_of_range_is_rejected_by_name() {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let named = |share, time_constant_s| Plant { share, time_constant_s }.validate(time).unwrap_err().field;

@@ -64,6 +64,22 @@ fn another_share_changes_the_weights_but_not_the_settled_value() {
 }
 
 #[test]
+fn a_differing_spring_has_the_multiplied_relaxation_and_is_checked_with_it() {
+    let (valid, quick) = (PLAIN.validate(sample_time()).unwrap(), (0.5, 2.0));
+    let relaxation = Relaxation {
+        share: 0.4,
+        time_constants_s: &[0.025, 0.2],
+        weights: &[0.375, 0.225],
+        time_constant_high_s: None,
+    };
+    let expected = config(&ExtendedPlant { relaxation, ..PLAIN });
+    assert_eq!(ExtendedPlant::differing(valid, quick, CODE_V).estimator, expected);
+    let checked = |factors| PLAIN.check_differing(factors, sample_time()).map_err(|error| error.field);
+    assert_eq!(checked(quick), Ok(()));
+    assert_eq!((checked((1.0, 60.0)), checked((0.01, 1.0))), (Err("relaxation.share"), Err("relaxation.tau_s")));
+}
+
+#[test]
 fn memory_and_law_multiply_the_step_gain_by_their_slopes() {
     let memory = Some(Memory { direct: 0.5, thresholds_v: &[10.0], weights: &[1.5] });
     let law = Some(Law { voltage_v: &[0.0, 100.0, 200.0], stiffness: &[0.0, 50.0, 350.0] });

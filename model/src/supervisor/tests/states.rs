@@ -3,6 +3,11 @@
 use super::*;
 
 #[test]
+fn the_safe_output_is_code_0_with_the_amplifier_off() {
+    assert_eq!((Drive::SAFE.code(), Drive::SAFE.enabled()), (DacCode(0), false));
+}
+
+#[test]
 fn the_output_is_disabled_before_arming() {
     let mut supervisor = Supervisor::new(config(), None);
     assert_eq!(tick(&mut supervisor, good()), (Decision::Rest, Drive::SAFE));
