@@ -379,5 +379,5 @@ impl<E: Estimator> Config<E> {
     }
 }
 
-#[cfg(all(test, feature = "robust"))]
+#[cfg(test)]
 mod tests;
