@@ -91,3 +91,17 @@ impl<'a, T> Validated<'a, T> {
         self.sample_time
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::Plant;
+
+    #[test]
+    fn a_part_that_may_be_absent_is_checked_if_it_is_there() {
+        let time = SampleTime::from_rate(1000.0).unwrap();
+        let slow = Plant { time_constant_s: 1e5, ..Plant::PAPER };
+        assert_eq!(Some(slow).check(time).unwrap_err().field, "time_constant_s");
+        assert_eq!((Some(Plant::PAPER).check(time), None::<Plant>.check(time)), (Ok(()), Ok(())));
+    }
+}

@@ -51,8 +51,9 @@ fn the_step_gain_is_the_response_of_the_spring_that_runs() {
 
 #[test]
 fn another_share_changes_the_weights_but_not_the_settled_value() {
-    LAGS.times((1.5, 1.2), |changed| {
+    Relaxation { time_constant_high_s: Some(0.06), ..LAGS }.times((1.5, 1.2), |changed| {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(changed.time_constant_high_s.is_some_and(|high_s| near(high_s, 0.09)), "{changed:?}");
         assert!(near(changed.share, 0.24), "{changed:?}");
         for (changed, expected) in changed.time_constants_s.iter().zip([0.075, 0.6]) {
             assert!(near(*changed, expected), "{changed}");

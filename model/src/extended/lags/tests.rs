@@ -25,6 +25,12 @@ fn a_step_response_is_the_exact_sum_of_exponentials_at_any_rate() {
 }
 
 #[test]
+fn a_single_lag_without_a_weight_has_what_the_share_leaves() {
+    let relaxation = Relaxation { share: 0.25, time_constants_s: &[5.0], weights: &[], time_constant_high_s: None };
+    assert!(relaxation.lags().eq([(5.0, 0.75)]));
+}
+
+#[test]
 fn a_setting_out_of_range_is_rejected_by_name() {
     let named = |share, time_constants_s: &[f64], weights: &[f64], time_constant_high_s| {
         let relaxation = Relaxation { share, time_constants_s, weights, time_constant_high_s };
