@@ -180,6 +180,9 @@ fn try_changes(
     // Its copies are built with the settings of its own profile, one at a time in a folder that stays, so that dependencies are
     // compiled once.
     command.env_remove("CARGO_INCREMENTAL").env("CARGO_PROFILE_MUTANTS_OPT_LEVEL", pass.opt_level);
+    // Each change is tried on the random inputs of the run without one, and none is kept: an input that fails by chance, kept in the folder
+    // that stays, would fail for every later change, which would count as caught.
+    command.env("PROPTEST_RNG_SEED", "1").env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1");
     if args.jobs == 1 {
         command.env("CARGO_TARGET_DIR", shell::target_directory()?.join("mutants/build"));
     }
