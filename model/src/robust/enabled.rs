@@ -210,3 +210,46 @@ impl<E: Estimator> Robust<E> {
         saturated(sum(base).saturating_add(self.of_gain.times(wanted.saturating_sub(base))))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::{self, Plant};
+
+    fn law(gain: f64, overshoot: f64) -> Robust<estimator::Config> {
+        let time = SampleTime::from_rate(1000.0).unwrap();
+        let margin = Margin { gain, overshoot, ..Margin::TYPICAL };
+        let quick = Invertible::new(Plant::PAPER.validate(time).unwrap(), 0.17);
+        margin.validate(time).unwrap().quantize(quick, None)
+    }
+
+    fn near(got: Weight, expected: f64) -> bool {
+        (got.to_f64() - expected).abs() < 1e-8
+    }
+
+    /// An error of the gain takes its part of the overshoot, and all of it if it is larger.
+    #[test]
+    fn without_a_sensor_the_overshoot_is_what_the_error_of_the_gain_leaves() {
+        for (gain, overshoot, blind) in [(0.0, 0.02, 0.02), (0.25, 0.2, 0.0), (0.1, 0.155, 0.05), (0.02, 0.02, 0.0)] {
+            let law = law(gain, overshoot);
+            assert!(near(law.overshoot, overshoot) && near(law.overshoot_blind, blind), "{law:?}");
+        }
+    }
+
+    /// 3 % of a step may be missing when it counts as done.
+    #[test]
+    fn the_target_is_moved_by_a_part_of_the_lead_that_grows_with_the_overshoot() {
+        for (overshoot, part) in [(0.0, 0.0), (0.03, 1.0), (0.02, 0.8), (0.12, 1.6)] {
+            assert!(near(law(0.0, overshoot).part, part), "{overshoot}");
+        }
+    }
+
+    #[test]
+    fn a_gain_is_taken_out_from_where_the_sensor_was_trusted() {
+        let (law, volts) = (law(0.25, 0.02), |volts: i32| Signal::from_num(volts));
+        let trusted = State { base: volts(100), trusted: true, ..State::default() };
+        assert!((law.without_gain(&trusted, volts(225)) - volts(200)).abs() < Signal::from_num(1e-5));
+        let blind = State { trusted: false, ..trusted };
+        assert_eq!(law.without_gain(&blind, volts(225)), volts(225));
+    }
+}
