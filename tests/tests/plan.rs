@@ -103,18 +103,18 @@ fn suspects_of_the_reports_stair_are_decided_by_the_planned_experiment() {
     assert!(said.contains("odds today") && said.contains("run the same schedule again"), "{said}");
 }
 
-/// A folder with the record `first.csv` of an amplifier whose supply sags: a limit, and something else that no cause describes.
-fn with_sagging_supply(seed: u64) -> TempDir {
+/// A folder with the record `first.csv` of a law that no cause describes.
+fn with_law(name: &str) -> TempDir {
     let folder = tempdir().unwrap();
     let forms = validation::ground_truth::out_of_model::all();
-    let sagging = forms.iter().find(|form| form.name == "sagging supply").expect("a form");
-    fs::write(folder.path().join("first.csv"), sagging.draw(seed).csv()).unwrap();
+    let form = forms.iter().find(|form| form.name == name).expect("a form");
+    fs::write(folder.path().join("first.csv"), form.draw(71).csv()).unwrap();
     folder
 }
 
 #[test]
 fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
-    let folder = with_sagging_supply(71);
+    let folder = with_law("sagging supply");
     let report = json(folder.path(), &["diagnose", "first.csv", "--json"]);
     assert_eq!(report["verdict"], "unexplained", "{report}");
     fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
@@ -134,7 +134,7 @@ fn every_suspect_that_a_voltage_shows_is_in_the_plan() {
 /// The spring that is reported is not the one of the search, where the causes need no other gain and time constant.
 #[test]
 fn the_suspects_beside_an_identified_spring_are_in_the_plan() {
-    let folder = with_sagging_supply(72);
+    let folder = with_law("ageing");
     let report = json(folder.path(), &["diagnose", "first.csv", "--plant", "identify", "--json"]);
     assert_eq!((&report["verdict"], &report["rivals"][0]["nats"]), (&"unexplained".into(), &0.0.into()), "{report}");
     fs::write(folder.path().join("first.json"), report.to_string()).unwrap();
