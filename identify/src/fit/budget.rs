@@ -6,7 +6,7 @@
 //! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 //!
-//! A search of normal effort that leaves structure when its work is scarce goes on, once, with [`FURTHER`] times as much.
+//! A search of normal effort whose work ends while it finds causes goes on, once, with twice as much.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
