@@ -18,7 +18,7 @@ impl Lcg64 {
 
     /// Draws a number from 0 to less than 1, a multiple of 2^-53.
     pub const fn uniform(&mut self) -> f64 {
-        (self.draw() >> 11) as f64 / (1u64 << 53) as f64
+        crate::uniform(self.draw())
     }
 
     /// Draws a nearly normal number of mean 0 and variance 1: the sum of twelve uniform numbers, less 6.

@@ -25,6 +25,11 @@ pub use splitmix64::SplitMix64;
 pub use xorshift32::Xorshift32;
 pub use xorshift64::Xorshift64;
 
+/// Returns the upper 53 bits of a number as a number from 0 to less than 1.
+const fn uniform(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1u64 << 53) as f64
+}
+
 /// Returns a nearly normal number of mean 0 and variance 1, -6 to 6: the sum of twelve uniform numbers from 0 to 1, less 6.
 fn normal(mut uniform: impl FnMut() -> f64) -> f64 {
     (0..12).map(|_| uniform() - 0.5).sum()

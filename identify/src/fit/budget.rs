@@ -108,10 +108,10 @@ pub struct Budget {
 }
 
 /// No limit.
-pub static UNLIMITED: Budget = Budget::of(u64::MAX, None);
+pub static UNLIMITED: Budget = Budget::of(u64::MAX, false, None);
 
 impl Budget {
-    const fn of(total: u64, stop: Option<Stop>) -> Self {
+    const fn of(total: u64, may_go_on: bool, stop: Option<Stop>) -> Self {
         Self {
             total,
             spent: AtomicU64::new(0),
@@ -123,15 +123,10 @@ impl Budget {
             cut: AtomicBool::new(false),
             present_cut: AtomicBool::new(false),
             extended: AtomicBool::new(false),
-            may_go_on: AtomicBool::new(false),
+            may_go_on: AtomicBool::new(may_go_on),
             further: AtomicU64::new(0),
             stop,
         }
-    }
-
-    /// Returns the same budget for work of an effort.
-    fn with(self, effort: Effort) -> Self {
-        Self { may_go_on: AtomicBool::new(effort == Effort::Normal), ..self }
     }
 
     /// Returns the budget for a record with a number of rows; `stop` ends it early.
@@ -141,14 +136,15 @@ impl Budget {
 
     /// Returns a part of the budget for a record with a number of rows.
     pub fn part(part: f64, effort: Effort, rows: usize, stop: Stop) -> Self {
-        Self::of((part * work(effort, rows)) as u64, Some(stop)).with(effort)
+        Self::of((part * work(effort, rows)) as u64, effort == Effort::Normal, Some(stop))
     }
 
-    /// Returns what a diagnosis that has spent some work on a record leaves for a further search, on `rows_searched` of its rows.
+    /// Returns what a diagnosis that has spent some work on a record leaves for a further search, on `rows_searched` of its rows; at least
+    /// the part by which a budget may be extended, as a search that went on has spent more than its own.
     pub fn left(effort: Effort, rows: usize, spent: u64, rows_searched: usize, stop: Stop) -> Self {
         let own = work(effort, rows);
         let left = ((EXTENSION * own) as u64).saturating_sub(spent).max(((EXTENSION - 1.0) * own) as u64);
-        Self::of(left.min(work(effort, rows_searched) as u64), Some(stop)).with(effort)
+        Self::of(left.min(work(effort, rows_searched) as u64), effort == Effort::Normal, Some(stop))
     }
 
     /// Counts work.
@@ -177,12 +173,16 @@ impl Budget {
 
     /// Gives the next search a share of the work that is left, 0 to 1.
     pub fn grant(&self, share: f64) {
+        self.begin((self.total().saturating_sub(self.spent()) as f64 * share) as u64);
+    }
+
+    /// Begins a search, or another round of one, that may do some work from here on.
+    fn begin(&self, granted: u64) {
         let spent = self.spent();
-        let granted =
-            |part: f64| spent.saturating_add((self.total().saturating_sub(spent) as f64 * share * part) as u64);
-        self.scarce.store(granted(SCARCE), Ordering::Relaxed);
-        self.limit.store(granted(1.0), Ordering::Relaxed);
-        self.granted.store(granted(1.0) - spent, Ordering::Relaxed);
+        let limit = spent.saturating_add(granted);
+        self.scarce.store(spent.saturating_add((SCARCE * granted as f64) as u64), Ordering::Relaxed);
+        self.limit.store(limit, Ordering::Relaxed);
+        self.granted.store(limit - spent, Ordering::Relaxed);
         self.reserved.store(0, Ordering::Relaxed);
         self.released.store(false, Ordering::Relaxed);
         self.present_cut.store(false, Ordering::Relaxed);
@@ -226,15 +226,9 @@ impl Budget {
         }
         let further = (FURTHER * self.granted() as f64) as u64;
         self.further.store(further, Ordering::Relaxed);
-        let (spent, limit) = (self.spent(), self.limit.load(Ordering::Relaxed).saturating_add(further));
-        let granted = limit.saturating_sub(spent);
-        self.limit.store(limit, Ordering::Relaxed);
-        self.granted.store(granted, Ordering::Relaxed);
-        self.scarce.store(spent + (SCARCE * granted as f64) as u64, Ordering::Relaxed);
-        self.reserved.store(0, Ordering::Relaxed);
-        self.released.store(false, Ordering::Relaxed);
+        let limit = self.limit.load(Ordering::Relaxed).saturating_add(further);
+        self.begin(limit.saturating_sub(self.spent()));
         self.cut.store(false, Ordering::Relaxed);
-        self.present_cut.store(false, Ordering::Relaxed);
         true
     }
 
