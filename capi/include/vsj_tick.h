@@ -98,6 +98,7 @@ typedef struct vsj_margin {
     double share;         /* error of the share, 0 to 0.25 */
     double gain;          /* error of the gain, 0 to 0.25 */
     double overshoot;     /* overshoot that is allowed on any of these springs, as a part of the step, 0 to 0.2 */
+    double fall_back;     /* part of a step that all springs may lose for a while, to be in the band earlier, 0 to 0.5 */
 } vsj_margin;
 
 /* Everything that a controller is built from. */
@@ -128,7 +129,7 @@ typedef struct vsj_error {
 
 /* The settings in fixed point, made by vsj_configure. */
 typedef struct vsj_config {
-    uint64_t opaque[128];
+    uint64_t opaque[144];
 } vsj_config;
 
 /* What changes from tick to tick, made by vsj_start. */

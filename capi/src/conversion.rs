@@ -27,8 +27,8 @@ impl All {
             }
             Compensation::TimeOptimal(approach) => (all.controller, all.approach_s) = (FAST, time_constant_s(approach)),
             Compensation::Robust(margin) => {
-                let [time_constant, share, gain, overshoot] = margin.values();
-                (all.controller, all.margin) = (ROBUST, Known { time_constant, share, gain, overshoot });
+                let [time_constant, share, gain, overshoot, fall_back] = margin.values();
+                (all.controller, all.margin) = (ROBUST, Known { time_constant, share, gain, overshoot, fall_back });
             }
         }
         all
@@ -105,10 +105,10 @@ impl Sensor {
 
 impl Known {
     fn compensation(&self) -> Result<Compensation, OutOfRange> {
-        let Self { time_constant, share, gain, overshoot } = *self;
+        let Self { time_constant, share, gain, overshoot, fall_back } = *self;
         let (value, highest) = (f64::from(ROBUST), f64::from(FAST));
         let none = OutOfRange { field: "controller", value, lowest: 0.0, highest, unit: "in a library without robust" };
-        Margin::from_values([time_constant, share, gain, overshoot]).map(Compensation::Robust).ok_or(none)
+        Margin::from_values([time_constant, share, gain, overshoot, fall_back]).map(Compensation::Robust).ok_or(none)
     }
 }
 

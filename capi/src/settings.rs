@@ -82,6 +82,8 @@ pub struct Known {
     pub gain: f64,
     /// Overshoot that is allowed, as a part of the step.
     pub overshoot: f64,
+    /// Fall back that is allowed, as a part of the step.
+    pub fall_back: f64,
 }
 
 /// `vsj_settings`: everything that a controller is built from, in SI units.

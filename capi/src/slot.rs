@@ -18,7 +18,7 @@ pub type ConfigSlot = Slot<AnyConfig, 0x7673_6a43>;
 pub type StateSlot = Slot<AnyState, 0x7673_6a53>;
 
 /// Bytes of `vsj_config`, at least those of [`ConfigSlot`].
-pub const CONFIG_BYTES: usize = 1024;
+pub const CONFIG_BYTES: usize = 1152;
 /// Bytes of `vsj_state`, at least those of [`StateSlot`].
 pub const STATE_BYTES: usize = 512;
 const _: () = assert!(size_of::<ConfigSlot>() <= CONFIG_BYTES && align_of::<ConfigSlot>() <= 8);

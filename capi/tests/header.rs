@@ -130,7 +130,7 @@ fn structures_have_the_same_places_and_constants_the_same_values() {
         sensor,
         margin
     );
-    structure!(text, "vsj_margin", Known, time_constant, share, gain, overshoot);
+    structure!(text, "vsj_margin", Known, time_constant, share, gain, overshoot, fall_back);
     structure!(text, "vsj_error", Refused, field, value, lowest, highest, unit);
     structure!(text, "vsj_input", TickInput, target, reading, reading_age, has_reading);
     structure!(text, "vsj_output", TickOutput, target, voltage, applied, stiffness, code, limits, sensor);

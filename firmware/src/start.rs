@@ -393,17 +393,17 @@ mod tests {
     fn what_the_image_does_not_contain_is_refused_by_its_name() {
         let check = |wire: WireSettings| check_settings(&store(&[]), &wire.payload().unwrap(), &BUILT_IN);
         let fast = WireSettings { controller: Controller::Fast, ..built_in_settings() };
-        let robust = WireSettings { controller: Controller::Robust, margin: Some([0.05; 4]), ..built_in_settings() };
+        let robust = WireSettings { controller: Controller::Robust, margin: Some([0.05; 5]), ..built_in_settings() };
         let sensor = with_sensor(0);
         let contains =
             |feature: bool, field| if feature { Ok(()) } else { Err(Reason::NotBuiltIn(Field::named(field))) };
         let fast_is_there = model::Approach::new(0.0).is_some();
         let sensor_is_there = model::Feedback::from_values([1.0; 8]).is_some();
-        let robust_is_there = model::Margin::from_values([0.05; 4]).is_some();
+        let robust_is_there = model::Margin::from_values([0.05; 5]).is_some();
         assert_eq!(check(fast), contains(fast_is_there, "controller"));
         assert_eq!(check(robust), contains(robust_is_there, "controller"));
         if robust_is_there {
-            let wide = check(WireSettings { margin: Some([0.05, 0.3, 0.0, 0.02]), ..robust });
+            let wide = check(WireSettings { margin: Some([0.05, 0.3, 0.0, 0.02, 0.0]), ..robust });
             assert!(matches!(wide, Err(Reason::BadSettings { field, .. }) if field == Field::named("margin.share")));
         }
         assert_eq!(check(sensor), contains(sensor_is_there, "sensor"));

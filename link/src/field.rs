@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Field(pub u8);
 
 /// Names in the order of their codes. The order is part of the protocol: new names are appended.
-const NAMES: [&str; 59] = [
+const NAMES: [&str; 60] = [
     "memory.direct",
     "memory.thresholds_v",
     "memory.weights",
@@ -70,6 +70,7 @@ const NAMES: [&str; 59] = [
     "tolerance.time_constant",
     "tolerance.share",
     "tolerance.gain",
+    "margin.fall_back",
 ];
 
 impl Field {

@@ -13,17 +13,20 @@ use crate::block::{self, PART};
 use crate::field::Field;
 use crate::reply::Controller;
 
-/// Newest version of the payload's format: the first one, and `trip_on_cause`, `margin?`, `tolerance?` and `adaptation?` behind it. A
-/// payload has the oldest version that holds its settings, so that programs which know no newer one go on reading what they can run.
-pub const FORMAT: u8 = 4;
+/// Newest version of the payload's format: the fourth one, and the margin's `fall_back` behind it. A payload has the oldest version that
+/// holds its settings, so that programs which know no newer one go on reading what they can run.
+pub const FORMAT: u8 = 5;
 /// First version of the payload's format.
 const FIRST: u8 = 1;
 /// Second version of the payload's format: the first one, and `trip_on_cause` behind it.
 const SECOND: u8 = 2;
-/// Third version of the payload's format: the second one, and `margin` behind it.
+/// Third version of the payload's format: the second one, and `margin` without its `fall_back` behind it.
 const THIRD: u8 = 3;
+/// Fourth version of the payload's format: the first one, and `trip_on_cause`, `margin?` without its `fall_back`, `tolerance?` and
+/// `adaptation?` behind it.
+const FOURTH: u8 = 4;
 /// Largest number of parts of a payload.
-pub const MOST_PARTS: u8 = 10;
+pub const MOST_PARTS: u8 = 11;
 /// Length of the longest payload, in bytes.
 pub const MOST_BYTES: usize = PART * MOST_PARTS as usize;
 
@@ -75,9 +78,9 @@ pub struct WireSettings {
     #[serde(skip)]
     pub trip_on_cause: u16,
     /// Margin of the robust controller, as [`Margin::values`]; `None` for another controller, and in a payload of an earlier version
-    /// than the third.
+    /// than the third. The last value, the fall back, is 0 in a payload of an earlier version than the fifth.
     #[serde(skip)]
-    pub margin: Option<[f64; 4]>,
+    pub margin: Option<[f64; 5]>,
     /// Errors of the model that are no fault for the isolation bank, as [`Tolerance::values`]; `None` for none, and in a payload of an
     /// earlier version than the fourth, as the next.
     #[serde(skip)]
@@ -185,11 +188,15 @@ impl WireSettings {
     #[inline(never)]
     pub fn payload(&self) -> Option<Payload> {
         let Self { trip_on_cause, margin, tolerance, adaptation, .. } = *self;
+        let fall_back = margin.map_or(0.0, |[.., fall_back]| fall_back);
+        let margin = margin.map(|[time_constant, share, gain, overshoot, _]| [time_constant, share, gain, overshoot]);
+        let newer = (trip_on_cause, margin, tolerance, adaptation);
         let (format, behind) = match (tolerance, adaptation, margin) {
+            _ if fall_back != 0.0 => (FORMAT, Behind::FallBack(newer, fall_back)),
             (None, None, None) if trip_on_cause == 0 => (FIRST, Behind::Nothing),
             (None, None, None) => (SECOND, Behind::Trip(trip_on_cause)),
             (None, None, Some(margin)) => (THIRD, Behind::Margin(trip_on_cause, margin)),
-            _ => (FORMAT, Behind::Adaptation(trip_on_cause, margin, tolerance, adaptation)),
+            _ => (FOURTH, Behind::Adaptation(newer)),
         };
         block::write(format, &(self, behind))
     }
@@ -202,14 +209,20 @@ impl WireSettings {
         if *format >= SECOND {
             (settings.trip_on_cause, bytes) = postcard::take_from_bytes(bytes).ok()?;
         }
+        let (mut margin, mut fall_back): (Option<[f64; 4]>, f64) = (None, 0.0);
         if *format == THIRD {
-            let (margin, rest) = postcard::take_from_bytes(bytes).ok()?;
-            (settings.margin, bytes) = (Some(margin), rest);
+            let (behind, rest) = postcard::take_from_bytes(bytes).ok()?;
+            (margin, bytes) = (Some(behind), rest);
+        }
+        if *format >= FOURTH {
+            let (behind, rest) = postcard::take_from_bytes(bytes).ok()?;
+            ((margin, settings.tolerance, settings.adaptation), bytes) = (behind, rest);
         }
         if *format == FORMAT {
-            let (behind, rest) = postcard::take_from_bytes(bytes).ok()?;
-            ((settings.margin, settings.tolerance, settings.adaptation), bytes) = (behind, rest);
+            (fall_back, bytes) = postcard::take_from_bytes(bytes).ok()?;
         }
+        settings.margin =
+            margin.map(|[time_constant, share, gain, overshoot]| [time_constant, share, gain, overshoot, fall_back]);
         ((FIRST..=FORMAT).contains(format) && bytes.is_empty()).then_some(settings)
     }
 }
@@ -221,8 +234,12 @@ enum Behind {
     Nothing,
     Trip(u16),
     Margin(u16, [f64; 4]),
-    Adaptation(u16, Option<[f64; 4]>, Option<[f64; 3]>, Option<[f64; 6]>),
+    Adaptation(Newer),
+    FallBack(Newer, f64),
 }
+
+/// What a payload has behind the settings of the first format from the fourth one on.
+type Newer = (u16, Option<[f64; 4]>, Option<[f64; 3]>, Option<[f64; 6]>);
 
 #[cfg(test)]
 mod tests {
@@ -240,7 +257,7 @@ mod tests {
             sensor: Some([2.5; 8]),
             controller: Controller::Robust,
             trip_on_cause: u16::MAX,
-            margin: Some([0.25; 4]),
+            margin: Some([0.25; 5]),
             tolerance: Some([0.5; 3]),
             adaptation: Some([0.125; 6]),
             ..WireSettings::new(&BUILT_IN)
@@ -250,7 +267,7 @@ mod tests {
     #[test]
     fn the_longest_settings_fit_and_survive_a_round_trip() {
         let payload = longest().payload().unwrap();
-        assert_eq!((payload.len(), WireSettings::read(&payload)), (315, Some(longest())));
+        assert_eq!((payload.len(), WireSettings::read(&payload)), (323, Some(longest())));
         assert!(payload.len() <= MOST_BYTES);
     }
 
@@ -292,7 +309,7 @@ mod tests {
 
     #[test]
     fn only_the_robust_controller_needs_a_payload_of_the_third_format() {
-        let margin = [0.05, 0.125, 0.0, 0.02];
+        let margin = [0.05, 0.125, 0.0, 0.02, 0.0];
         let robust = WireSettings { controller: Controller::Robust, ..WireSettings::new(&BUILT_IN) };
         let without = robust.payload().unwrap();
         for trip_on_cause in [0, 0x8001] {
@@ -303,7 +320,12 @@ mod tests {
             assert_eq!(*settings, without[1..], "the newer format has the first one in it");
             let (trip, numbers) = tail.split_at(tail.len() - 32);
             assert_eq!(trip, if trip_on_cause == 0 { &[0][..] } else { &[0x81, 0x80, 0x02] });
-            assert!(numbers.chunks(8).map(|bytes| f64::from_le_bytes(*bytes.first_chunk().unwrap())).eq(margin));
+            assert!(
+                numbers
+                    .chunks(8)
+                    .map(|bytes| f64::from_le_bytes(*bytes.first_chunk().unwrap()))
+                    .eq(margin[..4].iter().copied())
+            );
             let compensation = with.over(&BUILT_IN).map(|settings| settings.control.compensation);
             assert_eq!(compensation, Ok(Compensation::Robust(Margin::from_values(margin).unwrap())));
         }
@@ -313,10 +335,11 @@ mod tests {
 
     /// What no earlier program can run is in a payload that none of them reads.
     #[test]
-    fn only_an_adaptation_and_a_tolerance_need_a_payload_of_the_newest_format() {
+    fn only_an_adaptation_and_a_tolerance_need_a_payload_of_the_fourth_format() {
         let without = WireSettings::new(&BUILT_IN);
         let first = without.payload().unwrap();
-        let (tolerance, adaptation, margin) = (Some([0.01, 0.02, 0.25]), Some([0.5; 6]), Some([0.05; 4]));
+        let (tolerance, adaptation, margin) =
+            (Some([0.01, 0.02, 0.25]), Some([0.5; 6]), Some([0.05, 0.05, 0.05, 0.05, 0.0]));
         let robust = WireSettings { margin, ..without };
         for (settings, options) in [
             (WireSettings { tolerance, ..without }, [0, 1, 0]),
@@ -324,7 +347,7 @@ mod tests {
             (WireSettings { tolerance, adaptation, trip_on_cause: 5, ..robust }, [1, 1, 1]),
         ] {
             let payload = settings.payload().unwrap();
-            assert_eq!((payload[0], WireSettings::read(&payload)), (FORMAT, Some(settings)));
+            assert_eq!((payload[0], WireSettings::read(&payload)), (FOURTH, Some(settings)));
             let (head, tail) = payload[1..].split_at(first.len() - 1);
             assert_eq!(*head, first[1..], "the newer format has the first one in it");
             assert_eq!(u16::from(tail[0]), settings.trip_on_cause);
@@ -335,10 +358,26 @@ mod tests {
             }
             assert_eq!(at, tail.len());
         }
-        for old in [FIRST, SECOND, THIRD] {
+        for old in [FIRST, SECOND, THIRD, FOURTH] {
             let mut payload = longest().payload().unwrap();
             payload[0] = old;
             assert_eq!(WireSettings::read(&payload), None, "format {old}");
+        }
+    }
+
+    /// An earlier program, which would leave it out, does not read the payload; a fall back of 0 is in none.
+    #[test]
+    fn only_a_fall_back_needs_a_payload_of_the_newest_format() {
+        let margin = [0.05, 0.125, 0.0, 0.02, 0.25];
+        let without = WireSettings { margin: Some([0.05, 0.125, 0.0, 0.02, 0.0]), ..WireSettings::new(&BUILT_IN) };
+        for adaptation in [None, Some([0.5; 6])] {
+            let fourth = WireSettings { tolerance: Some([0.01; 3]), adaptation, ..without };
+            let with = WireSettings { margin: Some(margin), ..fourth };
+            let (newer, older) = (with.payload().unwrap(), fourth.payload().unwrap());
+            assert_eq!((newer[0], WireSettings::read(&newer)), (FORMAT, Some(with)));
+            assert_eq!((older[0], WireSettings::read(&older)), (FOURTH, Some(fourth)));
+            let (head, tail) = newer[1..].split_at(older.len() - 1);
+            assert_eq!((head, tail), (&older[1..], &0.25f64.to_le_bytes()[..]));
         }
     }
 

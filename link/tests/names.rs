@@ -90,7 +90,16 @@ fn controllers_are_called_as_on_the_command_line() {
         (Compensation::None, "none"),
         (Compensation::ProportionalIntegral(gains), "paper"),
         (Compensation::TimeOptimal(Approach { time_constant_s: 0.1 }), "fast"),
-        (Compensation::Robust(Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02 }), "robust"),
+        (
+            Compensation::Robust(Margin {
+                time_constant: 0.1,
+                share: 0.1,
+                gain: 0.1,
+                overshoot: 0.02,
+                ..Margin::TYPICAL
+            }),
+            "robust",
+        ),
     ] {
         assert_eq!(Controller::of(&compensation).name(), name);
     }

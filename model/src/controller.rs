@@ -128,7 +128,7 @@ impl<P: Model> Validated<'_, Settings<P>> {
             Compensation::TimeOptimal(approach) => {
                 PreCompensator::TimeOptimal(self.part(approach).quantize(&Invertible::new(plant, resolution_v), step_v))
             }
-            Compensation::Robust(margin) => self.robust(margin, step_v),
+            Compensation::Robust(margin) => self.robust(margin),
         };
         Config {
             amplifier: self.part(&settings.amplifier).quantize(),
@@ -140,10 +140,10 @@ impl<P: Model> Validated<'_, Settings<P>> {
 
     /// Quantizes the robust law. Not inlined: its second spring would be on the stack of every start.
     #[inline(never)]
-    fn robust(&self, margin: &Margin, step_v: Option<f64>) -> PreCompensator<P::Config> {
+    fn robust(&self, margin: &Margin) -> PreCompensator<P::Config> {
         let settings = self.settings();
         let quick = P::differing(self.part(&settings.plant), margin.factors(), settings.amplifier.volts_per_code());
-        PreCompensator::Robust(self.part(margin).quantize(quick, step_v))
+        PreCompensator::Robust(self.part(margin).quantize(quick, &settings.amplifier))
     }
 }
 

@@ -6,7 +6,7 @@ use model::{
     Amplifier, Compensation, Config, Feedback, Input, Margin, Output, Reading, ScaledStiffness, Settings, State, Volts,
 };
 
-const MARGIN: Margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02 };
+const MARGIN: Margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02, fall_back: 0.0 };
 
 fn config(compensation: Compensation, feedback: Option<Feedback>) -> Config {
     let amplifier = Amplifier::up_to(1000.0);
@@ -55,7 +55,7 @@ fn taking_over_does_not_move_the_voltage() {
 /// Without a sensor an error of the gain uses up a part of the overshoot that is allowed, on the quickest spring within the errors.
 #[test]
 fn an_error_of_the_gain_is_a_part_of_the_overshoot() {
-    let margin = Margin { time_constant: 0.05, share: 0.05, gain: 0.01, overshoot: 0.02 };
+    let margin = Margin { time_constant: 0.05, share: 0.05, gain: 0.01, ..Margin::TYPICAL };
     let robust = config(Compensation::Robust(margin), None);
     let (share, rate) = (1.05 / 11.0, -f64::exp_m1(-1e-3 / (0.95 * 5.5)));
     let (mut state, mut lag, mut highest) = (State::default(), 0.0, 0.0f64);

@@ -60,7 +60,13 @@ pub struct Known {
 impl Known {
     fn margin(self) -> Margin {
         let Self { tau, share, gain, overshoot } = self;
-        Margin { time_constant: tau / 100.0, share: share / 100.0, gain: gain / 100.0, overshoot: overshoot / 100.0 }
+        Margin {
+            time_constant: tau / 100.0,
+            share: share / 100.0,
+            gain: gain / 100.0,
+            overshoot: overshoot / 100.0,
+            ..Margin::TYPICAL
+        }
     }
 }
 
@@ -177,7 +183,7 @@ mod tests {
     fn the_robust_controller_is_that_of_the_command_to_the_bit() {
         let request = r#"{"plant":"paper","target":"step","controller":"robust","limit_v":1000,"slew_v_per_s":null,"kp":4,"ki":1.35,
             "approach_s":0,"known":{"tau":7,"share":3,"gain":1,"overshoot":2},"rate_hz":500}"#;
-        let margin = Margin { time_constant: 0.07, share: 0.03, gain: 0.01, overshoot: 0.02 };
+        let margin = Margin { time_constant: 0.07, share: 0.03, gain: 0.01, overshoot: 0.02, ..Margin::TYPICAL };
         let plant = spring("paper").expect("the report's spring");
         let settings = Request {
             plant: &plant,

@@ -31,7 +31,7 @@ pub(crate) struct LoopOptions {
     kp: Option<f64>,
     ki: Option<f64>,
     approach_s: Option<f64>,
-    margin: Option<[f64; 4]>,
+    margin: Option<[f64; 5]>,
     rate_hz: f64,
     feedback: Option<Sensor>,
 }

@@ -98,6 +98,9 @@ class Controller:
         0 to 25; what is not in it is exact. Default: ``{"tau": 5, "share": 5}``.
     overshoot_percent : float, optional
         Overshoot that the controller ``"robust"`` may cause, in percent of a step, 0 to 20; default: 2.
+    fall_back_percent : float, optional
+        Part of a step by which the controller ``"robust"`` may let all springs fall back for a while without a sensor, so that the slow
+        ones then stay above 97 % earlier, in percent, 0 to 50; default: 0.
     rate_hz : float
         Ticks per second, 100 to 10 000.
     feedback : Feedback, optional
@@ -123,6 +126,7 @@ class Controller:
         approach_s: Optional[float] = None,
         known: Optional[Mapping[str, float]] = None,
         overshoot_percent: Optional[float] = None,
+        fall_back_percent: Optional[float] = None,
         rate_hz: float = 1000.0,
         feedback: Optional[Feedback] = None,
     ) -> None:
@@ -138,7 +142,7 @@ class Controller:
             kp=optional("kp", kp),
             ki=optional("ki", ki),
             approach_s=optional("approach_s", approach_s),
-            margin=margin(controller, known, overshoot_percent),
+            margin=margin(controller, known, overshoot_percent, fall_back_percent),
             rate_hz=self.rate_hz,
             feedback=None if feedback is None else {name: number(name, value) for name, value in asdict(feedback).items()},
         )
@@ -223,22 +227,28 @@ def simulate(
 
 
 def margin(
-    controller: str, known: Optional[Mapping[str, float]], overshoot_percent: Optional[float]
+    controller: str,
+    known: Optional[Mapping[str, float]],
+    overshoot_percent: Optional[float],
+    fall_back_percent: Optional[float],
 ) -> Optional[List[float]]:
-    """The parts that a margin consists of: time constant, share, gain, overshoot; None for a controller that has none."""
-    if controller != "robust" and overshoot_percent is not None:
-        raise _vsj.BadInput("overshoot_percent applies to the robust controller only: expected the controller robust")
+    """The parts that a margin consists of: time constant, share, gain, overshoot, fall back; None for a controller that has none."""
+    for name, percent in (("overshoot_percent", overshoot_percent), ("fall_back_percent", fall_back_percent)):
+        if controller != "robust" and percent is not None:
+            raise _vsj.BadInput(f"{name} applies to the robust controller only: expected the controller robust")
     if known is None and controller != "robust":
         return None
     if known is not None and not isinstance(known, Mapping):
         raise _vsj.BadInput(f"known: {type(known).__name__}; expected a mapping such as {{'tau': 5}}")
     overshoot_percent = 2.0 if overshoot_percent is None else overshoot_percent
+    fall_back_percent = 0.0 if fall_back_percent is None else fall_back_percent
     known = {"tau": 5.0, "share": 5.0} if known is None else known
     unknown = set(known) - {"tau", "share", "gain"}
     if unknown:
         raise _vsj.BadInput(f"known: {', '.join(sorted(map(str, unknown)))}; expected tau, share or gain")
     parts = [number(f"known[{key!r}]", known.get(key, 0.0)) for key in ("tau", "share", "gain")]
-    return [part / 100.0 for part in (*parts, number("overshoot_percent", overshoot_percent))]
+    parts += [number("overshoot_percent", overshoot_percent), number("fall_back_percent", fall_back_percent)]
+    return [part / 100.0 for part in parts]
 
 
 def vector(values, name):

@@ -183,17 +183,24 @@ pub fn lowered(gains: &Gains, [kp, ki]: [Option<f64>; 2]) -> Vec<String> {
     said.collect()
 }
 
-/// A margin in a file.
+/// A margin in a file: its values, the last of which is not there without a fall back.
 mod margin {
     use model::Margin;
+    use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     pub(super) fn serialize<S: Serializer>(margin: &Option<Margin>, to: S) -> Result<S::Ok, S::Error> {
-        margin.map(|margin| margin.values()).serialize(to)
+        let values = margin.map(|margin| margin.values());
+        values.as_ref().map(|values| &values[..if values[4] == 0.0 { 4 } else { 5 }]).serialize(to)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Margin>, D::Error> {
-        Ok(Option::deserialize(from)?.and_then(Margin::from_values))
+        let Some(values) = Option::<Vec<f64>>::deserialize(from)? else { return Ok(None) };
+        match values[..] {
+            [a, b, c, d] => Ok(Margin::from_values([a, b, c, d, 0.0])),
+            [a, b, c, d, e] => Ok(Margin::from_values([a, b, c, d, e])),
+            _ => Err(D::Error::invalid_length(values.len(), &"the 4 or 5 values of a margin")),
+        }
     }
 }
 

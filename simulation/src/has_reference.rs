@@ -4,6 +4,7 @@
 //! time-optimal pre-compensator, which is defined in ticks, have the loop at the controller's rate, [`crate::sampled`].
 
 use model::estimator::Model;
+use model::robust::FallBack;
 use model::{Compensation, ExtendedPlant, Margin, Plant, Settings};
 
 use serde::Serialize;
@@ -164,11 +165,12 @@ impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
                     Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s)
                 }
                 Compensation::TimeOptimal(approach) => Controller::TimeOptimal(approach.time_constant_s),
-                Compensation::Robust(Margin { time_constant, share, gain, overshoot }) => Controller::Robust(Robust {
-                    quick: spring.clone().times(1.0 - time_constant, 1.0 + share),
-                    gain,
-                    overshoot,
-                }),
+                Compensation::Robust(margin) => {
+                    let Margin { time_constant, share, gain, overshoot, .. } = margin;
+                    let quick = spring.clone().times(1.0 - time_constant, 1.0 + share);
+                    let fall_back = FallBack::design(&margin, quick.steepest_slope());
+                    Controller::Robust(Robust { quick, gain, overshoot, fall_back })
+                }
             },
             spring,
             range_v: (settings.amplifier.min_v, settings.amplifier.max_v),

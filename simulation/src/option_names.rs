@@ -26,6 +26,7 @@ pub const SETTINGS: &[(&str, &str)] = &[
     ("integral_gain_per_s", "--ki"),
     ("approach_s", "--approach-s"),
     ("margin.overshoot", "--overshoot-percent"),
+    ("margin.fall_back", "--fall-back-percent"),
     ("margin.", "--known"),
     ("share", "--plant"),
     ("time_constant_s", "--plant"),

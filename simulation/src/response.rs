@@ -29,6 +29,19 @@ pub struct Response {
     pub bound_t97_s: Option<f64>,
 }
 
+/// Returns the time from the start of a change after which a loop's stiffness stays above a part of it, in s; `None` if it is below at the
+/// end.
+pub fn kept(run: &Run, samples: &[Sample], change: &Change, goal: f64) -> Option<f64> {
+    let Change { start_s, end_s, from_v, to_v } = *change;
+    let first = run.tick_at(start_s);
+    let last = run.tick_at(end_s).max(first + 1);
+    let part = |sample: &Sample| (sample.stiffness.to_f64() - from_v) / (to_v - from_v);
+    let window = &samples[first..last];
+    let below = window.iter().rposition(|sample| part(sample) < goal);
+    let after = below.map_or(0, |at| at + 1);
+    (after < window.len()).then(|| (run.time_s(first + after) - start_s).max(0.0))
+}
+
 /// Measures one loop of a run; the stiffness is interpolated linearly between ticks.
 pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Option<f64>) -> Response {
     let Change { start_s, end_s, from_v, to_v } = *change;
@@ -109,6 +122,18 @@ mod tests {
         }
         assert!((got.overshoot_percent - 10.0).abs() < 1e-3);
         assert_eq!(got.peak_v, 300.0);
+    }
+
+    /// A stiffness that is there after 2 s and 97 % of it again after 3.5 s; in the end it is lost.
+    #[test]
+    fn what_is_lost_again_is_not_kept() {
+        let stiffness = |t: f64| if (5.5..6.5).contains(&t) { 80.0 } else { (50.0 * (t - 3.0)).clamp(0.0, 100.0) };
+        let run = run(100.0, 900, stiffness, |_| 0.0);
+        let change = Change { start_s: 3.0, end_s: 8.0, from_v: 0.0, to_v: 100.0 };
+        let kept_s = |change: &Change, goal: f64| kept(&run, &run.with, change, goal);
+        assert!((kept_s(&change, 0.97).unwrap() - 3.5).abs() < 0.011);
+        assert!((kept_s(&change, 0.7).unwrap() - 1.4).abs() < 0.011);
+        assert_eq!(kept_s(&Change { end_s: 6.0, ..change }, 0.97), None);
     }
 
     /// Downwards, incomplete, and directly followed by the next change, whose first tick does not count.

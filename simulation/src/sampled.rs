@@ -7,9 +7,12 @@
 //!   linearised around the last voltage with the steepest slope that it has anywhere.
 //! - Time-optimal: the voltage that brings the spring to its target at the end of the tick, found by simulating copies of
 //!   the spring over that tick.
-//! - Robust: the same for the quickest spring that is possible, towards a target that is moved by a part of its lead over the spring.
+//! - Robust: the same for the quickest spring that is possible, towards a target that is moved by a part of its lead over the spring, and
+//!   lowered while the springs fall back.
 
 pub mod spring;
+
+use model::robust::FallBack;
 
 pub use spring::{Spring, simulate};
 
@@ -50,6 +53,8 @@ pub struct Robust {
     pub gain: f64,
     /// Overshoot that is allowed, as a part of the step.
     pub overshoot: f64,
+    /// When the springs fall back, if they do.
+    pub fall_back: Option<FallBack>,
 }
 
 /// State of spring, controller and amplifier, in V.
@@ -62,6 +67,9 @@ pub struct State {
     quick: spring::State,
     target: f64,
     step: f64,
+    /// Largest lead in this step, as a part of it, since the quick spring was at the target, and whether the springs fall back; `None`
+    /// once they have.
+    falling: Option<(f64, bool)>,
 }
 
 impl SampledLoop {
@@ -71,7 +79,15 @@ impl SampledLoop {
             Controller::Robust(robust) => robust.quick.at_rest(),
             _ => self.spring.at_rest(),
         };
-        State { spring: self.spring.at_rest(), integral: 0.0, voltage: 0.0, quick, target: 0.0, step: 0.0 }
+        State {
+            spring: self.spring.at_rest(),
+            integral: 0.0,
+            voltage: 0.0,
+            quick,
+            target: 0.0,
+            step: 0.0,
+            falling: None,
+        }
     }
 
     /// First half of a tick: returns the limited voltage before rounding, in V, for a target in V.
@@ -107,14 +123,34 @@ impl SampledLoop {
 
     /// How far above the target the quick spring is held: as far as the band of -3 % to the overshoot around it is used on both sides.
     fn excess(&self, robust: &Robust, state: &mut State, target: f64) -> f64 {
-        let Robust { quick, gain, overshoot } = robust;
+        let Robust { quick, gain, overshoot, fall_back } = robust;
         let stiffness = self.spring.stiffness(&state.spring);
         if target != state.target {
-            (state.target, state.step) = (target, target - stiffness);
+            (state.target, state.step, state.falling) = (target, target - stiffness, Some((0.0, false)));
         }
         let most = f64::max(0.0, (1.0 + overshoot) / (1.0 + gain) - 1.0) * state.step;
-        let lead = quick.stiffness(&state.quick) - stiffness;
-        (2.0 * overshoot / (overshoot + 0.03) * lead).clamp(most.min(0.0), most.max(0.0))
+        let reached = quick.stiffness(&state.quick);
+        let lead = reached - stiffness;
+        let held = |part: f64| (part * lead).clamp(most.min(0.0), most.max(0.0));
+        let Some(fall_back) = fall_back else { return held(2.0 * overshoot / (overshoot + 0.03)) };
+        let lead_part = lead / state.step;
+        if let Some((largest, falls)) = &mut state.falling
+            && (*falls || (target - reached) / state.step <= 1.0 / 32.0)
+        {
+            *largest = largest.max(lead_part);
+            let begins = !*falls && lead_part < *largest * (1.0 - 1.0 / 64.0) && lead_part <= fall_back.start;
+            *falls |= begins;
+            let jump = fall_back.jump * state.step;
+            let slewed =
+                FallBack::largest_jump_v(self.slew_v_per_s * self.sample_s, quick.settling_ticks(self.sample_s));
+            let after = state.voltage + jump;
+            let impossible = jump.abs() > slewed || after < self.range_v.0 || after > self.range_v.1;
+            if *falls && lead_part <= fall_back.end || begins && impossible {
+                state.falling = None;
+            }
+        }
+        let falls = matches!(state.falling, Some((_, true)));
+        held(fall_back.part) - if falls { fall_back.depth * state.step } else { 0.0 }
     }
 
     /// The voltage within the range that covers the approach's part of the distance to the target in the coming tick,

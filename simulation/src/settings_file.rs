@@ -123,6 +123,8 @@ table! {
         gain: f64,
         /// Overshoot that is allowed on any spring within the errors, as a part of the step.
         overshoot: f64,
+        /// Part of a step by which all springs may fall back for a while, without a sensor; 0 if they must not.
+        fall_back: f64,
     }
 }
 table! {
@@ -236,7 +238,8 @@ impl From<&WireSettings> for SettingsFile {
     /// A file with every value.
     fn from(wire: &WireSettings) -> Self {
         let [hang_ms, stall_ms, reset_ms] = wire.watchdogs_ms;
-        let [time_constant, share, gain, overshoot] = wire.margin.unwrap_or(model::Margin::TYPICAL.values()).map(Some);
+        let margin = wire.margin.unwrap_or(model::Margin::TYPICAL.values()).map(Some);
+        let [time_constant, share, gain, overshoot, fall_back] = margin;
         let mut sensor = Sensor { enabled: Some(wire.sensor.is_some()), ..Sensor::default() };
         for (value, key) in wire.sensor.unwrap_or_default().into_iter().zip(sensor.values_mut()) {
             *key = wire.sensor.map(|_| value);
@@ -252,7 +255,7 @@ impl From<&WireSettings> for SettingsFile {
             }),
             gains: Gains { proportional: Some(wire.proportional), integral_per_s: Some(wire.integral_per_s) },
             approach: Approach { tau_s: Some(wire.approach_s) },
-            margin: Margin { time_constant, share, gain, overshoot },
+            margin: Margin { time_constant, share, gain, overshoot, fall_back },
             amplifier: Amplifier {
                 full_scale_v: Some(wire.full_scale_v),
                 min_v: Some(wire.min_v),
@@ -337,9 +340,9 @@ impl Adaptation {
 
 impl Margin {
     /// The margin: the values of the file, else the built-in ones, else the typical ones.
-    fn over(&self, built_in: Option<[f64; 4]>) -> [f64; 4] {
-        let Self { time_constant, share, gain, overshoot } = *self;
-        over([time_constant, share, gain, overshoot], built_in.unwrap_or(model::Margin::TYPICAL.values()))
+    fn over(&self, built_in: Option<[f64; 5]>) -> [f64; 5] {
+        let Self { time_constant, share, gain, overshoot, fall_back } = *self;
+        over([time_constant, share, gain, overshoot, fall_back], built_in.unwrap_or(model::Margin::TYPICAL.values()))
     }
 }
 
@@ -516,13 +519,13 @@ mod tests {
     #[test]
     fn a_margin_is_that_of_the_robust_controller_alone() {
         let margin = |text| over(text).unwrap().margin;
-        assert_eq!(margin("schema = 1\ncontroller = \"robust\""), Some([0.05, 0.05, 0.0, 0.02]));
+        assert_eq!(margin("schema = 1\ncontroller = \"robust\""), Some([0.05, 0.05, 0.0, 0.02, 0.0]));
         let share = "schema = 1\ncontroller = \"robust\"\n[margin]\nshare = 0.1";
-        assert_eq!(margin(share), Some([0.05, 0.1, 0.0, 0.02]));
+        assert_eq!(margin(share), Some([0.05, 0.1, 0.0, 0.02, 0.0]));
         assert_eq!(margin("schema = 1\n[margin]\nshare = 0.1"), None, "the controller is `paper`");
-        let robust = WireSettings { controller: Controller::Robust, margin: Some([0.2; 4]), ..built_in() };
+        let robust = WireSettings { controller: Controller::Robust, margin: Some([0.2; 5]), ..built_in() };
         let over = |text| Source::parse("s.toml", text).unwrap().over(&robust).unwrap().margin;
-        assert_eq!(over("schema = 1\n[margin]\nshare = 0.1"), Some([0.2, 0.1, 0.2, 0.2]));
+        assert_eq!(over("schema = 1\n[margin]\nshare = 0.1"), Some([0.2, 0.1, 0.2, 0.2, 0.2]));
         assert_eq!(over("schema = 1\ncontroller = \"fast\""), None);
     }
 
@@ -548,7 +551,7 @@ mod tests {
             built_in(),
             WireSettings { controller: Controller::Fast, approach_s: 0.25, slew_v_per_s: Some(1e4), ..built_in() },
             WireSettings { sensor: Some(values), controller: Controller::None, ..built_in() },
-            WireSettings { controller: Controller::Robust, margin: Some([0.1, 0.05, 0.01, 0.03]), ..built_in() },
+            WireSettings { controller: Controller::Robust, margin: Some([0.1, 0.05, 0.01, 0.03, 0.25]), ..built_in() },
             WireSettings { sensor: Some(values), trip_on_cause: 0x8001, ..built_in() },
             WireSettings { tolerance: Some([0.01, 0.02, 0.0]), ..built_in() },
             WireSettings { sensor: Some(values), adaptation: Some([0.1, 0.2, 0.05, 0.04, 0.02, 0.3]), ..built_in() },

@@ -119,7 +119,7 @@ impl Specification<'_> {
 
     /// The worst response of a run over the stair.
     fn worst_of(&self, run: &Run) -> Worst {
-        Worst::of(self.responses(run).iter().map(|step| (step.t97_s, step.overshoot_percent)))
+        Worst::of(self.stair().changes().iter().map(|change| Worst::of_step(run, &run.with, change)))
     }
 
     /// The worst response on the stair; `None` if the tick rejects the settings.

@@ -20,7 +20,16 @@ pub const CONTROLLERS: [(&str, Compensation); 4] = [
     ("none", Compensation::None),
     ("paper", Compensation::ProportionalIntegral(Gains::PAPER)),
     ("fast", Compensation::TimeOptimal(Approach { time_constant_s: 0.0 })),
-    ("robust", Compensation::Robust(Margin { time_constant: 0.05, share: 0.05, gain: 0.01, overshoot: 0.02 })),
+    (
+        "robust",
+        Compensation::Robust(Margin {
+            time_constant: 0.05,
+            share: 0.05,
+            gain: 0.01,
+            overshoot: 0.02,
+            ..Margin::TYPICAL
+        }),
+    ),
 ];
 
 /// The springs with their names. The first is the plain spring, which has a tick of its own. The others use the extended tick,

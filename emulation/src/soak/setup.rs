@@ -68,6 +68,7 @@ fn settings(controller: u64, sensor: bool, random: &mut ChaCha8Rng) -> Settings 
             share: random.random_range(0.0..=0.25),
             gain: random.random_range(0.0..=0.25),
             overshoot: random.random_range(0.0..=0.2),
+            fall_back: random.random_range(0.0..=0.5),
         }),
         _ => Compensation::ProportionalIntegral(Gains {
             proportional: decades(random, 1e-3, 100.0),

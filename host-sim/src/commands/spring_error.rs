@@ -62,13 +62,17 @@ pub(super) struct Known {
     /// Overshoot that the robust controller may cause, in percent of the step, 0 to 20
     #[arg(long, default_value_t = 2.0, value_name = "PERCENT", allow_negative_numbers = true, requires = "known")]
     overshoot_percent: f64,
+    /// Part of a step by which the robust controller may let all springs fall back for a while, in percent, 0 to 50: without a sensor the
+    /// slow ones then stay above 97 % earlier
+    #[arg(long, default_value_t = 0.0, value_name = "PERCENT", allow_negative_numbers = true, requires = "known")]
+    fall_back_percent: f64,
 }
 
 impl Known {
     /// The robust controller's margin; `None` without `--known`.
     pub(super) fn margin(&self) -> Result<Option<Margin>> {
         let SpringError { share, time_constant, gain, .. } = together("--known", &self.known)?;
-        let overshoot = self.overshoot_percent / 100.0;
-        Ok((!self.known.is_empty()).then_some(Margin { time_constant, share, gain, overshoot }))
+        let (overshoot, fall_back) = (self.overshoot_percent / 100.0, self.fall_back_percent / 100.0);
+        Ok((!self.known.is_empty()).then_some(Margin { time_constant, share, gain, overshoot, fall_back }))
     }
 }

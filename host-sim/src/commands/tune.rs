@@ -50,6 +50,9 @@ pub(crate) struct Arguments {
     /// The spring is known to the 95 % intervals of this file, what `vsj identify --json` prints; at most 16 MiB
     #[arg(long, value_name = "FILE.json", conflicts_with = "known")]
     identified: Option<PathBuf>,
+    /// Part of a step by which the robust controller may let all springs fall back for a while, in percent, 0 to 50
+    #[arg(long, default_value_t = 0.0, value_name = "PERCENT", allow_negative_numbers = true)]
+    fall_back_percent: f64,
     /// Time in which each step has to be done, in s, for how well the spring has to be known
     #[arg(long, default_value_t = 0.6, value_name = "S", allow_negative_numbers = true)]
     within_s: f64,
@@ -69,11 +72,14 @@ impl Arguments {
             bad_input!("--within-s {within_s}: expected a number above 0");
         }
         if self.known.is_empty() && self.identified.is_none() {
+            if self.fall_back_percent != 0.0 {
+                bad_input!("--fall-back-percent: expected --known or --identified as well");
+            }
             return Ok(None);
         }
         let largest = Margin::LARGEST_ERROR;
         let spring_error = errors_with_small_shares("--known", &self.known, self.identified.as_deref(), largest)?;
-        Ok(Some(Knowledge { spring_error, within_s }))
+        Ok(Some(Knowledge { spring_error, within_s, fall_back: self.fall_back_percent / 100.0 }))
     }
 }
 

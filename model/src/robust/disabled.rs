@@ -4,6 +4,7 @@ use core::convert::Infallible;
 use core::marker::PhantomData;
 
 use super::Aim;
+use crate::amplifier::Amplifier;
 use crate::error::OutOfRange;
 use crate::estimator::{Estimator, Invertible};
 use crate::feedback::{self, Observed};
@@ -33,12 +34,12 @@ impl<S> Default for State<S> {
 
 impl Margin {
     /// Returns `None`: without the feature `robust` there is no robust pre-compensator.
-    pub const fn from_values(_values: [f64; 4]) -> Option<Self> {
+    pub const fn from_values(_values: [f64; 5]) -> Option<Self> {
         None
     }
 
     /// Returns the settings in the order of their fields; without the feature `robust` it is never called.
-    pub const fn values(&self) -> [f64; 4] {
+    pub const fn values(&self) -> [f64; 5] {
         match *self {}
     }
 
@@ -54,7 +55,7 @@ impl Validate for Margin {
 }
 
 impl Validated<'_, Margin> {
-    pub(crate) fn quantize<E: Estimator>(self, _: Invertible<E>, _: Option<f64>) -> Robust<E> {
+    pub(crate) fn quantize<E: Estimator>(self, _: Invertible<E>, _: &Amplifier) -> Robust<E> {
         match *self.settings() {}
     }
 }

@@ -1,6 +1,8 @@
 //! The law with its settings and state, built with the feature `robust`.
 
 use super::Aim;
+use super::fall_back::{FallBack, Phase, Thresholds};
+use crate::amplifier::Amplifier;
 use crate::coefficient::{Weight, saturated, sum, upper, widened};
 use crate::error::OutOfRange;
 use crate::estimator::{Estimator, Invertible};
@@ -10,7 +12,7 @@ use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
 use crate::validated::{Validate, Validated};
 
 /// Part of a step that may be missing when it counts as done: 97 % are reached.
-const MISSING: f64 = 0.03;
+pub(super) const MISSING: f64 = 0.03;
 /// Largest change of the voltage in the direction of a step while the sensor is trusted, in V/s.
 const RISE_V_PER_S: f64 = 20e3;
 
@@ -21,7 +23,7 @@ const RISE_V_PER_S: f64 = 20e3;
 ///
 /// fn main() -> Result<(), OutOfRange> {
 ///     // The share of 1/11 may be 10 % larger: a step of 90 V begins with less than the 988 V of the model's share.
-///     let margin = Margin { time_constant: 0.05, share: 0.1, gain: 0.0, overshoot: 0.02 };
+///     let margin = Margin { time_constant: 0.05, share: 0.1, ..Margin::TYPICAL };
 ///     let amplifier = model::Amplifier::up_to(1000.0);
 ///     let settings = Settings { compensation: Compensation::Robust(margin), amplifier, ..Settings::PAPER };
 ///     let config = settings.validate()?.quantize();
@@ -40,6 +42,9 @@ pub struct Margin {
     pub gain: f64,
     /// Overshoot that is allowed on any spring within the errors, as a part of the step, 0 to 0.2.
     pub overshoot: f64,
+    /// Part of a step by which all springs may fall back for a while, so that the slow ones are in the band earlier, 0 to 0.5; without a
+    /// sensor only. With 0 the spring without errors stays where it is once it is there.
+    pub fall_back: f64,
 }
 
 impl Margin {
@@ -47,20 +52,20 @@ impl Margin {
     pub const LARGEST_ERROR: f64 = 0.25;
 
     /// Time constants and share are known to within 5 %; the gain is exact, which no controller without a sensor can correct; 2 % of
-    /// overshoot are allowed.
-    pub const TYPICAL: Self = Self { time_constant: 0.05, share: 0.05, gain: 0.0, overshoot: 0.02 };
+    /// overshoot are allowed, and no fall back.
+    pub const TYPICAL: Self = Self { time_constant: 0.05, share: 0.05, gain: 0.0, overshoot: 0.02, fall_back: 0.0 };
 
     /// Returns the settings with these values, in the order of the fields, to be validated. `None` where the crate is built
     /// without the feature `robust`.
-    pub const fn from_values(values: [f64; 4]) -> Option<Self> {
-        let [time_constant, share, gain, overshoot] = values;
-        Some(Self { time_constant, share, gain, overshoot })
+    pub const fn from_values(values: [f64; 5]) -> Option<Self> {
+        let [time_constant, share, gain, overshoot, fall_back] = values;
+        Some(Self { time_constant, share, gain, overshoot, fall_back })
     }
 
     /// Returns the settings in the order of their fields.
-    pub const fn values(&self) -> [f64; 4] {
-        let Self { time_constant, share, gain, overshoot } = *self;
-        [time_constant, share, gain, overshoot]
+    pub const fn values(&self) -> [f64; 5] {
+        let Self { time_constant, share, gain, overshoot, fall_back } = *self;
+        [time_constant, share, gain, overshoot, fall_back]
     }
 
     /// Returns the factors of the quick spring's time constants and share.
@@ -74,7 +79,8 @@ impl Validate for Margin {
         OutOfRange::check("margin.time_constant", self.time_constant, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
         OutOfRange::check("margin.share", self.share, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
         OutOfRange::check("margin.gain", self.gain, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.overshoot", self.overshoot, 0.0..=0.2, "of a step")
+        OutOfRange::check("margin.overshoot", self.overshoot, 0.0..=0.2, "of a step")?;
+        OutOfRange::check("margin.fall_back", self.fall_back, 0.0..=0.5, "of a step")
     }
 }
 
@@ -93,6 +99,7 @@ pub(crate) struct Robust<E: Estimator> {
     overshoot_blind: Weight,
     /// Largest change of the voltage in a tick in the direction of a step while the sensor is trusted, in V.
     rise: Signal,
+    fall_back: Option<Thresholds>,
 }
 
 /// The quick spring and what the sensor has shown; the default is a spring at rest at 0 V.
@@ -107,21 +114,25 @@ pub struct State<S> {
     seen: Accumulator,
     /// Whether the sensor was trusted in the last tick.
     trusted: bool,
+    phase: Phase,
 }
 
 impl Validated<'_, Margin> {
-    /// Quantizes the law for the quick spring. `step_v` is the amplifier's largest change in a tick, in V, if the slew is limited.
-    pub(crate) fn quantize<E: Estimator>(self, quick: Invertible<E>, step_v: Option<f64>) -> Robust<E> {
+    /// Quantizes the law for the quick spring behind an amplifier.
+    pub(crate) fn quantize<E: Estimator>(self, quick: Invertible<E>, amplifier: &Amplifier) -> Robust<E> {
+        let step_v = amplifier.slew_per_tick_v(self.sample_time());
         let Margin { gain, overshoot, .. } = *self.settings();
+        let fall_back = FallBack::design(self.settings(), quick.largest.feedthrough);
         Robust {
             law: self.part(&Approach::DEAD_BEAT).quantize(&quick, step_v),
             quick: quick.estimator,
             gain: Weight::new(gain),
             of_gain: Weight::new(1.0 / (1.0 + gain)),
-            part: Weight::new(2.0 * overshoot / (overshoot + MISSING)),
+            part: Weight::new(fall_back.map_or(2.0 * overshoot / (overshoot + MISSING), |design| design.part)),
             overshoot: Weight::new(overshoot),
             overshoot_blind: Weight::new(((1.0 + overshoot) / (1.0 + gain) - 1.0).max(0.0)),
             rise: signal(RISE_V_PER_S * self.sample_time().seconds()),
+            fall_back: fall_back.map(|it| Thresholds::new(&it, &quick.largest, amplifier, self.sample_time())),
         }
     }
 }
@@ -146,6 +157,7 @@ impl<E: Estimator> Robust<E> {
             // What remains unseen is the same.
             state.seen = state.seen.saturating_sub(widened(self.by_gain(state, quick)));
             (state.base, state.trusted) = (quick, !blind);
+            state.phase = if changed && blind { Phase::Before(Signal::ZERO) } else { Phase::Over };
         }
         let lead = self.lead(state, quick, aim.model);
         if let Some((feedback, correction, observed)) = feedback {
@@ -153,9 +165,13 @@ impl<E: Estimator> Robust<E> {
         }
         let overshoot = if blind { self.overshoot_blind } else { self.overshoot };
         let (seen, most) = (upper(state.seen), saturated(overshoot.times(state.step)));
-        let unseen = saturated(self.part.times(lead.saturating_sub(seen)));
+        let unseen = lead.saturating_sub(seen);
+        let fall = self.fall_back.as_ref().map_or(Signal::ZERO, |thresholds| {
+            thresholds.fall(&mut state.phase, state.step, unseen, aim.pursued.0.saturating_sub(quick), aim.driven.0)
+        });
+        let unseen = saturated(self.part.times(unseen));
         let excess = unseen.max(most.min(Signal::ZERO)).min(most.max(Signal::ZERO));
-        let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess);
+        let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess).saturating_sub(fall);
         let wanted = self.without_gain(state, wanted);
         let voltage =
             self.law.voltage(&mut state.law, Volts(wanted), &self.quick, &state.quick, aim.driven, aim.applied);
@@ -182,6 +198,7 @@ impl<E: Estimator> Robust<E> {
         state.quick = *model;
         let quick = self.quick.predict(&state.quick, aim.applied).now;
         (state.target, state.step, state.base, state.trusted) = (aim.target.0, Signal::ZERO, quick, trusted);
+        state.phase = Phase::Over;
         let lead = if trusted { self.lead(state, quick, aim.model) } else { Signal::ZERO };
         state.seen = widened(lead);
         let wanted = self.without_gain(state, aim.pursued.0.saturating_add(lead));

@@ -23,6 +23,8 @@
 //! - **Without a sensor** the slow springs lag behind the quick one, which is held above the target by up to the overshoot that is
 //!   allowed, until they are there: with `part = 2 overshoot / (overshoot + 3 %)` the band of -3 % to the overshoot is used on both
 //!   sides. An error of the gain cannot be removed; it uses up the overshoot that is allowed.
+//!   Where it is allowed ([`Margin::fall_back`]), all springs fall back by a part of the step once the quick one has been at its target,
+//!   as long as the lead is between two thresholds: the slow springs are in the band earlier, and the model's spring leaves it for a while.
 //! - **With a sensor** the correction `d` brings the model to the readings, as without this law. What has been seen needs no margin any
 //!   more: the margin lasts as long as the sensor takes to show an error, and not as long as the spring takes to settle. The voltage
 //!   rises by at most 20 V in a millisecond (falls, in a step downward), so that a spring whose share is larger than the margin shows that
@@ -36,6 +38,8 @@
 mod disabled;
 #[cfg(feature = "robust")]
 mod enabled;
+#[cfg(feature = "robust")]
+mod fall_back;
 
 #[cfg(not(feature = "robust"))]
 pub(crate) use disabled::Robust;
@@ -45,6 +49,8 @@ pub use disabled::{Margin, State};
 pub(crate) use enabled::Robust;
 #[cfg(feature = "robust")]
 pub use enabled::{Margin, State};
+#[cfg(feature = "robust")]
+pub use fall_back::FallBack;
 
 use crate::units::{Signal, Volts};
 

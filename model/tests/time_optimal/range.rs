@@ -20,6 +20,7 @@ prop_compose! {
                 share: 0.25 * (1.0 - approach),
                 gain: 0.05 * (gain + 3.0),
                 overshoot: 0.2 * approach,
+                fall_back: 0.5 * (1.0 - approach),
             }),
             _ => Compensation::ProportionalIntegral(Gains {
                 proportional: 10f64.powf(gain),

@@ -143,6 +143,12 @@ impl Spring {
         self.share * law * (self.direct.max(0.0) + plays)
     }
 
+    /// Time constant with which the voltage settles for a constant stiffness, in ticks of `seconds`.
+    pub fn settling_ticks(&self, seconds: f64) -> f64 {
+        let later: f64 = self.lags.iter().map(|&(tau, weight)| weight * (1.0 - (-seconds / tau).exp())).sum();
+        self.share / later
+    }
+
     /// Smallest effect of 1 V when the voltage turns back, for ticks of `seconds`.
     pub fn reversal(&self, seconds: f64) -> Reversal {
         let slopes = self.law.windows(2).map(|pair| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0));

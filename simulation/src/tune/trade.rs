@@ -7,7 +7,7 @@ use model::ScaledStiffness;
 use serde::Serialize;
 
 use crate::experiment::{Run, Sample};
-use crate::response::{from_present, measure};
+use crate::response::from_present;
 use crate::sampled;
 use crate::spring_error::{DifferingSpring, Parameter, SpringError};
 use crate::tune::Specification;
@@ -55,9 +55,10 @@ pub(super) fn with_errors(specification: &Specification, errors: &SpringError, r
         ..*sample
     };
     let samples: Vec<Sample> = run.with.iter().zip(stiffness).map(answered).collect();
-    let each = specification.stair().changes().into_iter().map(|change| {
-        let response = measure(run, &samples, &from_present(run, &samples, &change), None);
-        (response.t97_s, response.overshoot_percent)
-    });
+    let each = specification
+        .stair()
+        .changes()
+        .into_iter()
+        .map(|change| Worst::of_step(run, &samples, &from_present(run, &samples, &change)));
     Worst::of(each)
 }

@@ -5,7 +5,7 @@
 //!   whose 95 % interval is the error, independently of the others.
 //! - *guaranteed*: the largest on the nominal spring and on those at all ends and middles of the intervals.
 //!
-//! t97 and overshoot are those of the worst step of the ideal stair. There is no sensor, so that the voltages are those of the nominal run.
+//! t97, the time after which a step stays above 97 %, and overshoot are those of the worst step of the ideal stair. There is no sensor, so that the voltages are those of the nominal run.
 
 use anyhow::Result;
 use model::{Compensation, Margin};
@@ -35,6 +35,8 @@ pub struct Knowledge {
     pub spring_error: SpringError,
     /// Time in which all steps have to be done, in s.
     pub within_s: f64,
+    /// Part of a step by which the robust controller may let all springs fall back for a while.
+    pub fall_back: f64,
 }
 
 /// Performance of the controllers within the errors, and what a time requires.
@@ -78,14 +80,14 @@ pub(super) fn evaluate(
     knowledge: &Knowledge,
 ) -> Result<Uncertainty> {
     let Specification { file, amplifier, overshoot_percent, .. } = *specification;
-    let Knowledge { spring_error, within_s } = *knowledge;
+    let Knowledge { spring_error, within_s, fall_back } = *knowledge;
     let SpringError { time_constant, gain, .. } = spring_error;
     let overshoot = overshoot_percent / 100.0;
     let (share, remarks) = share_margin(file.relaxation.share, &spring_error);
     let ends = spring_error.ends(&[-1.0, 0.0, 1.0]);
     ends.iter().try_for_each(|error| DifferingSpring::new(file, error).check())?;
     let drawn = drawn(&spring_error);
-    let margin = Margin { time_constant, share, gain, overshoot };
+    let margin = Margin { time_constant, share, gain, overshoot, fall_back };
     let gains = gains([None; 2], Controller::Paper, file, specification.rate_hz)?;
     let compensations = [
         ("paper", Compensation::ProportionalIntegral(gains)),
@@ -100,7 +102,7 @@ pub(super) fn evaluate(
             controller,
             nominal: with_errors(specification, &SpringError::default(), &run),
             worst_95: quantile(&at_drawn),
-            guaranteed: Worst::of(at_ends.iter().map(|worst| (worst.t97_s, worst.overshoot_percent))),
+            guaranteed: Worst::of(at_ends.into_iter()),
         })
     });
     let controllers = controllers.collect::<Result<_>>()?;
@@ -151,9 +153,10 @@ fn quantile(each: &[Worst]) -> Worst {
         values.sort_by(f64::total_cmp);
         values[at]
     };
-    let t97_s = of(|worst| worst.t97_s.unwrap_or(f64::INFINITY));
+    let time = |value: fn(&Worst) -> f64| Some(of(value)).filter(|time_s| time_s.is_finite());
     Worst {
-        t97_s: Some(t97_s).filter(|t97_s| t97_s.is_finite()),
+        t97_s: time(|worst| worst.t97_s.unwrap_or(f64::INFINITY)),
+        kept97_s: time(|worst| worst.kept97_s.unwrap_or(f64::INFINITY)),
         overshoot_percent: of(|worst| worst.overshoot_percent),
     }
 }
@@ -167,9 +170,13 @@ mod tests {
 
     #[test]
     fn the_quantile_leaves_a_twentieth_above_it() {
-        let worst = |t97_s: f64| Worst { t97_s: (t97_s < 97.5).then_some(t97_s), overshoot_percent: 100.0 - t97_s };
+        let worst = |t97_s: f64| Worst {
+            t97_s: (t97_s < 97.5).then_some(t97_s),
+            kept97_s: (t97_s < 90.0).then_some(2.0 * t97_s),
+            overshoot_percent: 100.0 - t97_s,
+        };
         let each: Vec<Worst> = (1..=100).map(|of| worst(f64::from(of))).collect();
-        assert_eq!(quantile(&each), Worst { t97_s: Some(95.0), overshoot_percent: 94.0 });
+        assert_eq!(quantile(&each), Worst { t97_s: Some(95.0), kept97_s: None, overshoot_percent: 94.0 });
         assert_eq!(quantile(&[worst(98.0); 20]).t97_s, None);
     }
 
@@ -186,7 +193,7 @@ mod tests {
         };
         let spring_error = SpringError::default().with(Parameter::Share, 0.1);
         let fast = Compensation::TimeOptimal(Approach::DEAD_BEAT);
-        let found = evaluate(&specification, fast, &Knowledge { spring_error, within_s: 0.6 }).unwrap();
+        let found = evaluate(&specification, fast, &Knowledge { spring_error, within_s: 0.6, fall_back: 0.0 }).unwrap();
         let [_, fast, robust] = found.controllers[..] else { panic!("three controllers") };
         assert!(fast.guaranteed.overshoot_percent > 5.0, "{fast:?}");
         assert!(robust.guaranteed.overshoot_percent < 2.1, "{robust:?}");

@@ -77,7 +77,13 @@ fn run(cli: &Cli) -> Result<bool> {
         write!(text, "### Sensor failure for {} s\n\n{}\n", sensor_failure::FAILS_S, tables::failures(&responses))?;
         criteria.extend(tables::criteria(name, &outcomes, feedback.noise_v));
     }
-    let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: bound::OVERSHOOT_PERCENT / 100.0 };
+    let margin = Margin {
+        time_constant: 0.1,
+        share: 0.1,
+        gain: 0.1,
+        overshoot: bound::OVERSHOOT_PERCENT / 100.0,
+        ..Margin::TYPICAL
+    };
     let robust = Settings { compensation: Compensation::Robust(margin), ..fast };
     let name = "The robust controller at 1000 V";
     let outcomes = requirement::all(&robust, cli.seeds, cli.first_seed).map_err(|error| anyhow!("{name}: {error}"))?;

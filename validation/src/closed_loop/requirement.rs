@@ -188,7 +188,7 @@ mod tests {
     use model::{Amplifier, Compensation, Feedback, Margin};
 
     fn robust() -> Settings {
-        let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02 };
+        let margin = Margin { time_constant: 0.1, share: 0.1, gain: 0.1, overshoot: 0.02, ..Margin::TYPICAL };
         Settings {
             compensation: Compensation::Robust(margin),
             amplifier: Amplifier::up_to(1000.0),

@@ -176,8 +176,9 @@ fn sensor_text(sensor: &Sensor) -> String {
 }
 
 fn margin_text(margin: &Known) -> String {
-    let Known { time_constant, share, gain, overshoot } = margin;
-    let entries = [("time_constant", time_constant), ("share", share), ("gain", gain), ("overshoot", overshoot)];
+    let Known { time_constant, share, gain, overshoot, fall_back } = margin;
+    let known = [("time_constant", time_constant), ("share", share), ("gain", gain)];
+    let entries = [&known[..], &[("overshoot", overshoot), ("fall_back", fall_back)]].concat();
     part("margin", &entries)
 }
 

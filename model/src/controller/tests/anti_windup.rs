@@ -68,12 +68,13 @@ fn compensation() -> impl Strategy<Value = Compensation> {
             Compensation::ProportionalIntegral(Gains { proportional, integral_per_s })
         }),
         prop_oneof![Just(0.0), unit()].prop_map(|time| Compensation::TimeOptimal(Approach { time_constant_s: time })),
-        (unit(), unit(), unit(), unit()).prop_map(|(time_constant, share, gain, overshoot)| {
+        (unit(), unit(), unit(), unit(), unit()).prop_map(|(time_constant, share, gain, overshoot, fall_back)| {
             Compensation::Robust(Margin {
                 time_constant: 0.25 * time_constant,
                 share: 0.25 * share,
                 gain: 0.25 * gain,
                 overshoot: 0.2 * overshoot,
+                fall_back: 0.5 * fall_back,
             })
         }),
     ]
