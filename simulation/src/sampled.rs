@@ -70,6 +70,8 @@ pub struct State {
     /// Largest lead in this step, as a part of it, since the quick spring was at the target, and whether the springs fall back; `None`
     /// once they have.
     falling: Option<(f64, bool)>,
+    /// Half of the quick spring's lead when the target changed.
+    lead_before: f64,
 }
 
 impl SampledLoop {
@@ -87,6 +89,7 @@ impl SampledLoop {
             target: 0.0,
             step: 0.0,
             falling: None,
+            lead_before: 0.0,
         }
     }
 
@@ -127,13 +130,14 @@ impl SampledLoop {
         let stiffness = self.spring.stiffness(&state.spring);
         if target != state.target {
             (state.target, state.step, state.falling) = (target, target - stiffness, Some((0.0, false)));
+            state.lead_before = 0.5 * (quick.stiffness(&state.quick) - stiffness);
         }
         let most = f64::max(0.0, (1.0 + overshoot) / (1.0 + gain) - 1.0) * state.step;
         let reached = quick.stiffness(&state.quick);
         let lead = reached - stiffness;
         let held = |part: f64| (part * lead).clamp(most.min(0.0), most.max(0.0));
         let Some(fall_back) = fall_back else { return held(2.0 * overshoot / (overshoot + 0.03)) };
-        let lead_part = lead / state.step;
+        let lead_part = (lead - state.lead_before) / state.step;
         if let Some((largest, falls)) = &mut state.falling
             && (*falls || (target - reached) / state.step <= 1.0 / 32.0)
         {

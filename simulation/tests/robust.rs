@@ -301,3 +301,20 @@ fn a_fall_back_near_the_limits_overshoots_no_more_and_is_not_later() {
         }
     }
 }
+
+/// Each step of a stair begins 10 s after the one before, when the springs still differ; each is measured from where it is then.
+#[test]
+fn a_fall_back_saves_a_tenth_of_the_time_on_a_stair() {
+    let stair = [&[(0.0, 1.0)][..], &[100.0, 200.0, 300.0, 400.0, 500.0].map(|target| (target, 10.0))].concat();
+    let slowest = |fall_back: f64| {
+        let margin = Margin { time_constant: 0.05, share: 0.0, gain: 0.0, overshoot: OVERSHOOT, fall_back };
+        let settings = settings(Compensation::Robust(margin), None);
+        let spring = |part: i32| SpringError { time_constant: 0.01 * f64::from(part), ..SpringError::default() };
+        let each: Vec<_> = (-5..=5).map(|part| steps(&settings, &spring(part), &stair, None)).collect();
+        let worst = |at: usize| each.iter().map(|steps| steps[at].0).fold(0.0, f64::max);
+        (0..5).map(worst).collect::<Vec<f64>>()
+    };
+    let (without, with) = (slowest(0.0), slowest(0.25));
+    println!("{without:?} {with:?}");
+    assert!(with.iter().zip(&without).all(|(with, without)| with < &(0.9 * without)), "{without:?} {with:?}");
+}

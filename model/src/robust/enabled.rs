@@ -115,6 +115,8 @@ pub struct State<S> {
     /// Whether the sensor was trusted in the last tick.
     trusted: bool,
     phase: Phase,
+    /// Half of the lead that was unseen when the target changed.
+    lead_before: Signal,
 }
 
 impl Validated<'_, Margin> {
@@ -166,9 +168,18 @@ impl<E: Estimator> Robust<E> {
         let overshoot = if blind { self.overshoot_blind } else { self.overshoot };
         let (seen, most) = (upper(state.seen), saturated(overshoot.times(state.step)));
         let unseen = lead.saturating_sub(seen);
-        let fall = self.fall_back.as_ref().map_or(Signal::ZERO, |thresholds| {
-            thresholds.fall(&mut state.phase, state.step, unseen, aim.pursued.0.saturating_sub(quick), aim.driven.0)
-        });
+        let fall = match &self.fall_back {
+            None => Signal::ZERO,
+            Some(thresholds) => {
+                if changed {
+                    // A slow spring begins below the last target by what it still lacks, of which half remains at the end.
+                    state.lead_before = unseen >> 1;
+                }
+                let gained = unseen.saturating_sub(state.lead_before);
+                let missing = aim.pursued.0.saturating_sub(quick);
+                thresholds.fall(&mut state.phase, state.step, gained, missing, aim.driven.0)
+            }
+        };
         let unseen = saturated(self.part.times(unseen));
         let excess = unseen.max(most.min(Signal::ZERO)).min(most.max(Signal::ZERO));
         let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess).saturating_sub(fall);

@@ -28,7 +28,7 @@ const SLEWED: f64 = 0.3;
 /// Part of the largest lead by which it has to have fallen before the fall back, as a shift to the right.
 const FALLEN_SHIFT: u32 = 6;
 
-/// When to fall back, in the lead over the model as a part of the step.
+/// When to fall back, in the lead that the quick spring has gained over the model since the target changed, as a part of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FallBack {
     /// Part of the step that is given up.
@@ -152,8 +152,8 @@ impl Thresholds {
         }
     }
 
-    /// Returns by how much the target of a `step` is lowered in this tick, with the sign of the step. `lead` is that of the quick spring over
-    /// the model, `missing` the quick spring's distance to the target, and `driven` the last voltage.
+    /// Returns by how much the target of a `step` is lowered in this tick, with the sign of the step. `lead` is what the quick spring's lead over
+    /// the model has gained since the target changed, `missing` the quick spring's distance to the target, and `driven` the last voltage.
     #[inline(always)]
     pub(super) fn fall(
         &self,
