@@ -239,7 +239,7 @@ inline const char* field_name(std::uint8_t code) {
         "stall_ms", "reset_ms", "trip_on_cause", "range_v", "plant.time_constant_s", "margin.time_constant", "margin.share",
         "margin.gain", "margin.overshoot", "adaptation.enabled", "adaptation.time_constant", "adaptation.share",
         "adaptation.gain", "adaptation.rate_per_s", "adaptation.precision", "adaptation.excitation",
-        "tolerance.time_constant", "tolerance.share", "tolerance.gain"};
+        "tolerance.time_constant", "tolerance.share", "tolerance.gain", "margin.fall_back"};
     return code < sizeof names / sizeof *names ? names[code] : "another setting";
 }
 

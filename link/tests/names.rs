@@ -18,10 +18,11 @@ fn a_fault_has_the_name_and_the_remedy_of_the_supervisor() {
 
 #[test]
 fn a_field_keeps_its_name_across_the_link() {
-    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms", "tolerance.gain"] {
+    for name in ["memory.direct", "leakage.share", "integral_gain_per_s", "controller", "reset_ms", "margin.fall_back"]
+    {
         assert_eq!(Field::named(name).name(), name);
     }
-    for unknown in [Field::named("no such field"), Field(59)] {
+    for unknown in [Field::named("no such field"), Field(60)] {
         assert_eq!(unknown.name(), "another setting");
     }
     assert_eq!(Field::named("no such field"), Field::OTHER);
