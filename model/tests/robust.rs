@@ -24,6 +24,7 @@ fn a_margin_out_of_range_is_rejected_by_name() {
         (Margin { share: -0.1, ..MARGIN }, "margin.share"),
         (Margin { gain: f64::NAN, ..MARGIN }, "margin.gain"),
         (Margin { overshoot: 0.3, ..MARGIN }, "margin.overshoot"),
+        (Margin { fall_back: 0.6, ..MARGIN }, "margin.fall_back"),
     ] {
         let settings = Settings { compensation: Compensation::Robust(margin), ..Settings::PAPER };
         assert_eq!(settings.validate().unwrap_err().field, field);
