@@ -49,6 +49,7 @@ fn every_option_of_the_loop_changes_the_settings_for_c() {
         &["--known", "share=5"],
         &["--known", "gain=5"],
         &["--overshoot-percent", "3", "--known", "tau=5"],
+        &["--fall-back-percent", "25", "--known", "tau=5"],
         &["--rate-hz", "2000"],
     ];
     let folder = tempfile::tempdir().unwrap();

@@ -248,7 +248,7 @@ mod tests {
         let time = SampleTime::from_rate(1000.0).unwrap();
         let margin = Margin { gain, overshoot, ..Margin::TYPICAL };
         let quick = Invertible::new(Plant::PAPER.validate(time).unwrap(), 0.17);
-        margin.validate(time).unwrap().quantize(quick, None)
+        margin.validate(time).unwrap().quantize(quick, &Amplifier::PAPER)
     }
 
     fn near(got: Weight, expected: f64) -> bool {
