@@ -34,7 +34,7 @@ fn an_exported_model_is_the_one_that_the_command_sends() {
 #[test]
 fn every_option_of_the_loop_changes_the_settings_for_c() {
     let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/plant.toml");
-    let cases: [&[&str]; 15] = [
+    let cases: [&[&str]; 16] = [
         &[],
         &["--controller", "fast"],
         &["--plant", plant],
