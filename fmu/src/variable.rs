@@ -77,6 +77,7 @@ pub enum Setting {
     KnownShare,
     KnownGain,
     Overshoot,
+    FallBack,
 }
 
 impl Setting {
@@ -95,13 +96,14 @@ impl Setting {
             Self::Kp => options.kp = value,
             Self::Ki => options.ki = value,
             Self::ApproachS => options.approach_s = Some(value),
-            Self::KnownTau | Self::KnownShare | Self::KnownGain | Self::Overshoot => {
+            Self::KnownTau | Self::KnownShare | Self::KnownGain | Self::Overshoot | Self::FallBack => {
                 let margin = options.margin.get_or_insert(Margin::TYPICAL);
                 let part = match self {
                     Self::KnownTau => &mut margin.time_constant,
                     Self::KnownShare => &mut margin.share,
                     Self::KnownGain => &mut margin.gain,
-                    _ => &mut margin.overshoot,
+                    Self::Overshoot => &mut margin.overshoot,
+                    _ => &mut margin.fall_back,
                 };
                 *part = value;
             }

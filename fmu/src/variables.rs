@@ -44,7 +44,7 @@ fn rate(options: &Options) -> Variable {
         .at(options.rate_hz)
 }
 
-fn settings(options: &Options) -> [Variable; 13] {
+fn settings(options: &Options) -> [Variable; 14] {
     let setting = |name, setting, unit, description| Variable::new(name, Role::Setting(setting), unit, description);
     let part = |name, of, description| setting(name, of, "", description);
     let controllers = CONTROLLERS.len() as f64;
@@ -104,6 +104,13 @@ fn settings(options: &Options) -> [Variable; 13] {
         part("overshoot", Setting::Overshoot, "Overshoot that the controller robust may cause, as a part of a step")
             .within(0.0, 0.2)
             .at(margin.overshoot),
+        part(
+            "fall_back",
+            Setting::FallBack,
+            "Part of a step by which the controller robust may let all springs fall back for a while",
+        )
+        .within(0.0, 0.5)
+        .at(margin.fall_back),
     ]
 }
 

@@ -43,7 +43,7 @@ pub struct Control {
     pub rate_hz: f64,
 }
 
-/// Errors to within which the robust controller knows the spring, and the overshoot that it may cause, in percent.
+/// Errors to within which the robust controller knows the spring, and what a step may overshoot and fall back, in percent.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Known {
@@ -55,17 +55,20 @@ pub struct Known {
     pub gain: f64,
     /// Overshoot of a step.
     pub overshoot: f64,
+    /// Part of a step by which all springs may fall back for a while.
+    #[serde(default)]
+    pub fall_back: f64,
 }
 
 impl Known {
     fn margin(self) -> Margin {
-        let Self { tau, share, gain, overshoot } = self;
+        let Self { tau, share, gain, overshoot, fall_back } = self;
         Margin {
             time_constant: tau / 100.0,
             share: share / 100.0,
             gain: gain / 100.0,
             overshoot: overshoot / 100.0,
-            ..Margin::TYPICAL
+            fall_back: fall_back / 100.0,
         }
     }
 }
@@ -182,8 +185,8 @@ mod tests {
     #[test]
     fn the_robust_controller_is_that_of_the_command_to_the_bit() {
         let request = r#"{"plant":"paper","target":"step","controller":"robust","limit_v":1000,"slew_v_per_s":null,"kp":4,"ki":1.35,
-            "approach_s":0,"known":{"tau":7,"share":3,"gain":1,"overshoot":2},"rate_hz":500}"#;
-        let margin = Margin { time_constant: 0.07, share: 0.03, gain: 0.01, overshoot: 0.02, ..Margin::TYPICAL };
+            "approach_s":0,"known":{"tau":7,"share":3,"gain":1,"overshoot":2,"fall_back":20},"rate_hz":500}"#;
+        let margin = Margin { time_constant: 0.07, share: 0.03, gain: 0.01, overshoot: 0.02, fall_back: 0.2 };
         let plant = spring("paper").expect("the report's spring");
         let settings = Request {
             plant: &plant,

@@ -54,7 +54,13 @@ export class ControlPanel {
   /** The request that the settings make. */
   request() {
     const target = byId("target").value;
-    const percents = () => ({ tau: number("known-tau"), share: number("known-share"), gain: number("known-gain"), overshoot: number("overshoot") });
+    const percents = () => ({
+      tau: number("known-tau"),
+      share: number("known-share"),
+      gain: number("known-gain"),
+      overshoot: number("overshoot"),
+      fall_back: number("fall-back"),
+    });
     const files = { drawn: this.#target.csv(), planned: this.#planned };
     return {
       plant: spring(),
@@ -224,6 +230,7 @@ function command(request) {
   if (request.known) {
     for (const key of ["tau", "share", "gain"]) words.push("--known", `${key}=${request.known[key]}`);
     words.push("--overshoot-percent", request.known.overshoot);
+    if (request.known.fall_back) words.push("--fall-back-percent", request.known.fall_back);
   }
   if (request.rate_hz !== 1000) words.push("--rate-hz", request.rate_hz);
   return [...words, "--json"].join(" ");

@@ -58,9 +58,41 @@ impl Kernel {
     }
 
     /// How far the spring is behind the quick one at a time after a step, as a part of the step.
+    // Called, not copied to each place: the image that holds everything has a few hundred bytes left.
+    #[inline(never)]
     fn behind(&self, time: f64) -> f64 {
         let kept = |(weight, tau): (f64, f64)| weight * (1.0 - lag_fraction(time, tau));
         if time < 0.0 { 0.0 } else { kept(self.slow) + kept(self.fast) }
+    }
+}
+
+/// A step of the quick spring, whose springs fall back for [`DURATION`].
+struct Step {
+    /// Stiffness of the quick spring, as a part of the step.
+    highest: f64,
+    /// Time constant with which the voltage settles, in time constants of the model.
+    settles: f64,
+}
+
+impl Step {
+    /// How far a spring is behind the quick one at a time, if all lose `depth` until the fall back's `end`.
+    #[inline(never)]
+    fn behind(&self, spring: &Kernel, depth: f64, time: f64, end: f64) -> f64 {
+        let start = (end - DURATION * self.settles).max(0.0);
+        self.highest * spring.behind(time) + depth * (spring.behind(time - end) - spring.behind(time - start))
+    }
+
+    /// Returns the earliest end of a fall back by `depth` after which a spring is at most `allowed` behind the quick one.
+    #[inline(never)]
+    fn earliest_end(&self, spring: &Kernel, depth: f64, allowed: f64) -> f64 {
+        let (mut early, mut late) = (0.0, LATEST);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (early + late);
+            let time = |at: usize| middle + at as f64 * CHECKED.1 * self.settles;
+            let holds = (0..CHECKED.0).all(|at| self.behind(spring, depth, time(at), middle) <= allowed);
+            if holds { late = middle } else { early = middle }
+        }
+        late
     }
 }
 
@@ -74,31 +106,17 @@ impl FallBack {
         let quick = (quick_share, 1.0 - time_constant);
         let slow = Kernel::new(quick, (nominal * (1.0 - share), 1.0 + time_constant));
         let (highest, lowest) = ((1.0 + overshoot) / (1.0 + gain), (1.0 - MISSING) / (1.0 - gain));
-        let settles = quick.0 * quick.1;
-        let behind = |kernel: &Kernel, depth: f64, time: f64, end: f64| {
-            let start = (end - DURATION * settles).max(0.0);
-            highest * kernel.behind(time) + depth * (kernel.behind(time - end) - kernel.behind(time - start))
-        };
-        let earliest = |depth: f64| {
-            let holds = |end: f64| {
-                let times = (0..CHECKED.0).map(|at| end + at as f64 * CHECKED.1 * settles);
-                times.map(|time| behind(&slow, depth, time, end)).fold(0.0, f64::max) <= highest - lowest - RESERVE
-            };
-            let (mut early, mut late) = (0.0, LATEST);
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (early + late);
-                if holds(middle) { late = middle } else { early = middle }
-            }
-            late
-        };
-        let end = earliest(depth);
-        let start = end - DURATION * settles;
-        if depth == 0.0 || start <= 0.0 || end >= earliest(0.0).min(0.99 * LATEST) {
+        let allowed = highest - lowest - RESERVE;
+        let step = Step { highest, settles: quick.0 * quick.1 };
+        let earliest_end = |depth| step.earliest_end(&slow, depth, allowed);
+        let end = earliest_end(depth);
+        let start = end - DURATION * step.settles;
+        if depth == 0.0 || allowed <= 0.0 || start <= 0.0 || end >= earliest_end(0.0).min(0.99 * LATEST) {
             return None;
         }
         let model = Kernel::new(quick, (nominal, 1.0));
         // Just before the steps.
-        let lead = |time: f64| behind(&model, depth, time - 1e-6, end);
+        let lead = |time: f64| step.behind(&model, depth, time - 1e-6, end);
         let (start, end) = (lead(start), lead(end));
         // The quick spring is at the allowed overshoot when the lead is down to the end.
         let part = ((highest - 1.0).max(0.0) / end.max(1e-3)).min(LARGEST_PART);
