@@ -40,7 +40,7 @@ pub fn run(stopwatch: &mut impl Stopwatch) -> Result<Outcome, OutOfRange> {
     let (plant, amplifier) = (settings.control.plant, settings.control.amplifier);
     let terms = isolation::Terms::new(&settings, Some(plant), amplifier.max_v);
     let mut control = Control::new(&settings.control, &SUPERVISION, None)?;
-    let mut isolation = Isolation::NEW;
+    let mut isolation = Isolation::off();
     isolation.start(&terms);
     let mut planner = Planner::new(Terms::new(&settings, amplifier, &terms));
     let mut measured = None;

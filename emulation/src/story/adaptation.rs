@@ -57,7 +57,7 @@ fn one(stage: &Stage, name: &str, disturbance: &Disturbance, gain: f64) -> Resul
     let settings = built_in(*script.settings());
     let amplifier = settings.control.amplifier;
     let bank = isolation::Terms::new(&settings, Some(settings.control.plant), amplifier.max_v);
-    let mut isolation = Box::new(Isolation::NEW);
+    let mut isolation = Box::new(Isolation::off());
     isolation.start(&bank);
     let mut adaptation = Alone::new(Terms::new(&settings, amplifier, &bank));
     let (mut host, mut tick) = (Vec::new(), 0u32);

@@ -40,7 +40,7 @@ pub fn open<P: Pages>(
     }
     isolation::set_terms(start.isolation);
     adaptation::set_terms(adaptation::Terms::new(&loaded.settings, start.amplifier, &start.isolation));
-    let Some(isolation) = singleton!(: Isolation = Isolation::NEW) else { return Ok(None) };
+    let Some(isolation) = singleton!(: Isolation = Isolation::off()) else { return Ok(None) };
     isolation.start(&start.isolation);
     Ok(server(&start, loaded, brown_out, seed)?.map(|server| (control, isolation, server)))
 }

@@ -37,7 +37,9 @@ pub struct Isolation;
 
 impl Isolation {
     /// An empty bank.
-    pub const NEW: Self = Self;
+    pub const fn off() -> Self {
+        Self
+    }
 
     /// Starts nothing.
     pub fn start(&mut self, _: &Terms) {}

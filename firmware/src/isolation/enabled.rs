@@ -119,20 +119,24 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    /// No bank runs. A constant: the state is too large for the stack.
-    pub const NEW: Self = Self {
-        config: None,
-        trip_on_cause: Causes::NONE,
-        tripped: false,
-        acknowledging: false,
-        last: None,
-        reported: (Verdict::Quiet, 0, 0),
-        state: isolation::State::NEW,
-        #[cfg(feature = "adaptation")]
-        watch: adaptation::Watch::NEW,
-        #[cfg(feature = "adaptation")]
-        tolerance: Volts::ZERO,
-    };
+    /// Creates the state in which no bank runs. Inlined, so that it is built in its place: it is too large for the stack, and a constant
+    /// would be 6 KB of zeros in the image.
+    #[inline(always)]
+    pub const fn off() -> Self {
+        Self {
+            config: None,
+            trip_on_cause: Causes::NONE,
+            tripped: false,
+            acknowledging: false,
+            last: None,
+            reported: (Verdict::Quiet, 0, 0),
+            state: isolation::State::at_rest(),
+            #[cfg(feature = "adaptation")]
+            watch: adaptation::Watch::NEW,
+            #[cfg(feature = "adaptation")]
+            tolerance: Volts::ZERO,
+        }
+    }
 
     /// Starts the bank for a spring at rest at 0 V. Call it before the first tick.
     #[inline(never)]

@@ -38,7 +38,7 @@ impl Rig {
     /// At rest, disarmed.
     pub(crate) fn new(settings: &device::Settings) -> Self {
         let terms = Terms::new(settings, Some(Plant::PAPER), settings.control.amplifier.max_v);
-        let mut isolation = Box::new(Isolation::NEW);
+        let mut isolation = Box::new(Isolation::off());
         isolation.start(&terms);
         let control = Control::new(&settings.control, &settings.supervision, None).unwrap();
         Self { control, isolation, terms, gain: 1.0, slow_v: 0.0, measured: None, numbers: Lcg32::new(1) }

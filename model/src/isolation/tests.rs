@@ -285,7 +285,7 @@ fn every_tick_is_the_same_to_the_bit() {
 #[test]
 fn counters_at_their_ends_stay_there() {
     let config = config(1000.0);
-    let mut state = State { age: u32::MAX, since_decision: u32::MAX, ..State::NEW };
+    let mut state = State { age: u32::MAX, since_decision: u32::MAX, ..State::at_rest() };
     // Between the level at which the sums restart and that of an alarm nothing resets them.
     state.tests.highest = config.restart;
     config.assess(&mut state);
@@ -296,7 +296,7 @@ fn counters_at_their_ends_stay_there() {
 fn readings_are_pinned_below_the_model_by_more_than_three_deviations() {
     let config = config(1000.0);
     for (residual, pinned) in [(config.pinned_below, false), (config.pinned_below - 1, true)] {
-        let mut state = State::NEW;
+        let mut state = State::at_rest();
         state.tests.highest = config.restart;
         (state.means.pinned, state.means.residual) = (true, residual);
         config.assess(&mut state);
