@@ -67,7 +67,7 @@ fn run_with(change: Happens, trip_on_cause: Causes, adapts: bool) -> Run {
     let settings = settings(trip_on_cause);
     settings.check().unwrap();
     let terms = Terms::new(&settings, Some(Plant::PAPER), settings.control.amplifier.max_v);
-    let mut isolation = Box::new(Isolation::NEW);
+    let mut isolation = Box::new(Isolation::off());
     isolation.start(&terms);
     let mut control = Control::new(&settings.control, &SUPERVISION, None).unwrap();
     let amplifier = settings.control.amplifier;

@@ -70,6 +70,9 @@ const LONG: &[Step] = &[
     Step::emulation("cost bank", &["emulate", "--isolation"]),
     Step::emulation("cost ticks", &["emulate", "--blocks"]),
     Step::emulation("boot all", &["boot", "--all"]),
+    // The images that need most of each controller's and the bank's memory.
+    Step::emulation("size robust", &["size", "--controller", "robust", "--limit-v", "1000"]),
+    Step::emulation("size both", &["size", "--adaptation"]),
 ];
 
 /// The Python package has no tests in Rust, and for an interpreter `package` would build its bindings again.
