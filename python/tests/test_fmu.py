@@ -206,7 +206,7 @@ def test_every_parameter_beyond_the_range_of_the_description_is_an_error(export,
                 outside = float(bound) + side * max(1e-3, 0.01 * abs(float(bound)))
                 value = outside if variable.type in ("Real", "Float64") else int(bound) + side
                 # Only one controller has an approach, and only one a margin.
-                with_margin = variable.name.startswith("known_") or variable.name == "overshoot"
+                with_margin = variable.name.startswith("known_") or variable.name in ("overshoot", "fall_back")
                 others = dict(controller=4) if with_margin else dict(controller=3) if variable.name == "approach_s" else {}
                 with pytest.raises(FMICallException):
                     Instance(path, **{variable.name: value}, **others)
