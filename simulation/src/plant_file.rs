@@ -59,6 +59,9 @@ pub struct PlantFile {
     /// Limits of the amplifier with which the record was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplifier: Option<Amplifier>,
+    /// Voltages between which the spring was identified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<Range>,
     /// Oscillations in parallel with the relaxation; the tick takes them as instantaneous.
     #[serde(rename = "mode", default, skip_serializing_if = "Vec::is_empty")]
     pub modes: Vec<Mode>,
@@ -181,6 +184,16 @@ pub struct Amplifier {
     pub delay_s: Option<f64>,
 }
 
+/// The voltages of the record from which a spring was identified.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Lowest voltage, in V.
+    pub lowest_v: f64,
+    /// Highest voltage, in V; at least the lowest.
+    pub highest_v: f64,
+}
+
 impl Relaxation {
     /// Voltage at which the time constant is `tau_high_s` unless the file names another, in V.
     pub const HIGH_V: f64 = 500.0;
@@ -213,6 +226,7 @@ impl From<Plant> for PlantFile {
             leakage: None,
             relaxation,
             amplifier: None,
+            range: None,
             modes: Vec::new(),
             unmodelled: None,
         }
@@ -276,6 +290,19 @@ impl PlantFile {
         Ok(())
     }
 
+    /// Checks that the range of the record has an end above its start.
+    fn check_range(&self) -> Result<(), OutOfRange> {
+        let Some(Range { lowest_v, highest_v }) = self.range else { return Ok(()) };
+        for (field, value, lowest) in
+            [("range.lowest_v", lowest_v, -f64::MAX), ("range.highest_v", highest_v, lowest_v)]
+        {
+            if !(lowest..=f64::MAX).contains(&value) {
+                return Err(OutOfRange { field, value, lowest, highest: f64::MAX, unit: "V" });
+            }
+        }
+        Ok(())
+    }
+
     /// Part of the settled response that oscillates, 0 or more: the magnitudes of the weights of all oscillations.
     pub fn oscillating_part(&self) -> f64 {
         if self.modes.is_empty() {
@@ -318,6 +345,7 @@ impl PlantFile {
             _ => error,
         })?;
         self.check_reading()?;
+        self.check_range()?;
         let amplifier = self.amplifier.clone().unwrap_or_default();
         for (field, value, lowest, highest, unit) in [
             ("amplifier.limit_v", amplifier.limit_v, 10.0, 1000.0, "V"),
@@ -396,6 +424,7 @@ impl PlantFile {
             }
         }
         self.check_reading()?;
+        self.check_range()?;
         let lengths = |field, found: usize, expected: usize, unit| match found == expected {
             true => Ok(()),
             false => refused(field, found as f64, expected as f64, expected as f64, unit),
@@ -446,13 +475,14 @@ impl PlantFile {
     }
 
     /// The size in V of the five steps of the stair on this spring behind an amplifier: the report's 100 V, or less where the stair would
-    /// end at more than twice the recorded limit or the end of the law, or beyond the range of the amplifier, if the command is no voltage.
-    /// Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
+    /// end at more than twice the recorded limit, the end of the law or the highest voltage from which the spring was identified, or beyond
+    /// the range of the amplifier, if the command is no voltage. Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
     pub fn stair_step_v(&self, amplifier: model::Amplifier) -> f64 {
         let recorded = self.amplifier.as_ref().and_then(|amplifier| amplifier.limit_v);
         let of_other_command = self.units.as_ref().and_then(UnitNames::other_command).map(|_| amplifier.max_v);
         let law_v = self.law.as_ref().and_then(|law| law.voltage_v.last().copied());
-        let own_v = recorded.into_iter().chain(law_v).fold(f64::INFINITY, f64::min);
+        let identified_v = self.range.map(|range| range.highest_v);
+        let own_v = recorded.into_iter().chain(law_v).chain(identified_v).fold(f64::INFINITY, f64::min);
         let range_v = of_other_command.unwrap_or(f64::INFINITY);
         let end_v = own_v.min(range_v);
         if end_v <= 0.0 || range_v >= 5.0 * STAIR_STEP_V && own_v >= 2.5 * STAIR_STEP_V {

@@ -14,7 +14,8 @@ use super::spring_error::{ErrorOf, Known, together};
 
 /// Compare all controllers on the stair of ideal steps with each other and with the lower bound for any controller
 ///
-/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's amplifier, law or command is too small for them.
+/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's record, amplifier, law or command is too small
+/// for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:

@@ -26,7 +26,8 @@ use simulation::schedule::Between;
 
 /// Run the stair experiment in closed loop on the fixed-point controller, compared with the report's Table 3
 ///
-/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's amplifier, law or command is too small for them.
+/// The steps are of 100 V, up to 500 V; smaller where the range of a plant file's record, amplifier, law or command is too small
+/// for them.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:

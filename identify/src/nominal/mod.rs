@@ -32,7 +32,7 @@ use simulation::units::Units;
 use crate::linear::{LARGEST_ORDER, Problem, Series, best_up_to, fewest_readings};
 use crate::nominal::identified::described;
 use crate::nominal::models::Models;
-use crate::nominal::plant::VoltageRange;
+use crate::nominal::plant::{VoltageRange, range};
 use crate::nominal::report::{AtBound, FarReading, InputLaw, ZeroShift};
 use crate::nominal::usable::check;
 use crate::record::bounds::Bounds;
@@ -244,7 +244,7 @@ fn of_all(records: &[Record], shifts: &[Vec<f64>], asked: Asked) -> (Identified,
             models = square;
         }
     }
-    let voltage = VoltageRange { full_scale_v: full_scale, both_signs };
+    let voltage = VoltageRange { full_scale_v: full_scale, both_signs, range: range(records) };
     let mut identified = Identified { linear, ..described(records, &models, voltage, units) };
     let names = records.iter().zip(shifts).flat_map(|(record, shifts)| shifts.iter().map(|at| (&record.name, *at)));
     let sizes = models.problem.shift_sizes(models.best_fit());

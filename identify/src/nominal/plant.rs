@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use simulation::plant_file::{Amplifier, Law, Mode, PlantFile, Reading, Relaxation};
+use simulation::plant_file::{Amplifier, Law, Mode, PlantFile, Range, Reading, Relaxation};
+use simulation::record::Record;
 use simulation::units::{UnitNames, Units};
 
 use crate::nominal::report::{InputLaw, Nominal, Oscillation, Quantity};
@@ -20,6 +21,17 @@ pub(super) struct VoltageRange {
     pub(super) full_scale_v: f64,
     /// True if both signs occur.
     pub(super) both_signs: bool,
+    /// Lowest and highest voltage.
+    pub(super) range: Range,
+}
+
+/// Returns the voltages of the records.
+pub(super) fn range(records: &[Record]) -> Range {
+    let voltages = || records.iter().flat_map(|record| &record.rows).map(|row| row.voltage_v);
+    Range {
+        lowest_v: voltages().fold(f64::INFINITY, f64::min),
+        highest_v: voltages().fold(f64::NEG_INFINITY, f64::max),
+    }
 }
 
 /// The law `v^2 / full scale` as a table.
@@ -83,6 +95,7 @@ pub(super) fn plant_file(
         leakage: None,
         relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: None },
         amplifier: (delay_s > 0.0).then(|| Amplifier { delay_s: Some(delay_s), ..Amplifier::default() }),
+        range: Some(voltage.range),
         modes,
         unmodelled: None,
     }

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use random_numbers::Lcg32;
+use simulation::plant_file::Range;
 use simulation::record::Row;
 
 use super::*;
@@ -388,6 +389,10 @@ fn plant_file_holds_the_spring_in_its_units() {
     assert_eq!((plant.relaxation.tau_s.len(), plant.amplifier.clone(), plant.even), (1, None, false));
     assert_eq!(plant.units.as_ref().unwrap().reading.as_deref(), Some("mm"));
     assert_eq!(identified.report.nominal.gain.unit, "mm/V");
+    let voltages =
+        |of: fn(f64, f64) -> f64, start| record(800, 0, 0.0, 0.01).rows.iter().map(|row| row.voltage_v).fold(start, of);
+    let (lowest_v, highest_v) = (voltages(f64::min, f64::INFINITY), voltages(f64::max, f64::NEG_INFINITY));
+    assert_eq!(plant.range, Some(Range { lowest_v, highest_v }));
     plant.check_for_host().unwrap();
 }
 

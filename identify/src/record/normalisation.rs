@@ -12,7 +12,7 @@
 //! The record's own time constant, gain and zero are those of a quick first-order fit. They are also where the search starts if
 //! the nominal spring is far from the record ([`Start`]).
 
-use simulation::plant_file::{Amplifier, Law, Leakage, Memory, Mode, PlantFile, Relaxation};
+use simulation::plant_file::{Amplifier, Law, Leakage, Memory, Mode, PlantFile, Range, Relaxation};
 use simulation::record::{Record, Row};
 use simulation::units::Units;
 
@@ -233,6 +233,7 @@ fn scaled(file: &PlantFile, time: impl Fn(f64) -> f64, voltage: impl Fn(f64) -> 
             slew_v_per_s: amplifier.slew_v_per_s.map(|slew| voltage(slew) / time(1.0)),
             delay_s: amplifier.delay_s.map(&time),
         }),
+        range: file.range.map(|range| Range { lowest_v: voltage(range.lowest_v), highest_v: voltage(range.highest_v) }),
         ..file.clone()
     }
 }

@@ -190,6 +190,7 @@ fn steps_of_the_stair_follow_the_range_of_the_spring() {
         file.stair_step_v(model::Amplifier::up_to(amplifier_v))
     };
     let law = |end: f64| format!("[law]\nvoltage_v = [0, {end}]\nstiffness = [0, {end}]");
+    let range = |lowest: f64, highest: f64| format!("[range]\nlowest_v = {lowest}\nhighest_v = {highest}");
     for (more, amplifier_v, expected) in [
         ("", 700.0, 100.0),
         // A range that is only an option's is refused.
@@ -204,7 +205,29 @@ fn steps_of_the_stair_follow_the_range_of_the_spring() {
         (&law(480.0), 700.0, 100.0),
         (&law(240.0), 700.0, 20.0),
         (&law(5.0), 700.0, 0.5),
+        (&range(-5.0, 240.0), 700.0, 20.0),
+        (&range(0.0, 5.0), 700.0, 0.5),
+        (&range(0.0, 430.0), 700.0, 100.0),
+        // Nothing is known of a stair, which is above 0 V.
+        (&range(-5.0, 0.0), 700.0, 100.0),
     ] {
         assert!((step(more, amplifier_v) / expected - 1.0).abs() < 1e-12, "{more} {}", step(more, amplifier_v));
+    }
+}
+
+#[test]
+fn a_range_that_ends_below_its_start_is_refused() {
+    let file = |lowest: &str, highest: &str| {
+        format!(
+            "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 1\n[range]\nlowest_v = {lowest}\nhighest_v = {highest}\n"
+        )
+    };
+    for read in [parse, parse_for_host] {
+        assert!(read("p", &file("5", "5")).is_ok());
+        for (lowest, highest, field) in [("5", "4.9", "highest_v"), ("0", "inf", "highest_v"), ("nan", "5", "lowest_v")]
+        {
+            let error = read("p", &file(lowest, highest)).unwrap_err().to_string();
+            assert!(error.contains(&format!("{field} = ")), "{error}");
+        }
     }
 }
