@@ -41,7 +41,7 @@ fn every_setting_of_the_tick_comes_back_from_those_of_c() {
         settings(PLAIN),
         Settings { compensation: Compensation::None, feedback: None, ..full },
         Settings { compensation: fast, amplifier: Amplifier::up_to(1000.0), ..full },
-        Settings { compensation: Compensation::Robust(Margin::TYPICAL), ..full },
+        Settings { compensation: Compensation::Robust(Margin { fall_back: 0.25, ..Margin::TYPICAL }), ..full },
         settings(ExtendedPlant { leakage: None, ..FULL }),
         settings(ExtendedPlant { memory: None, law: None, ..FULL }),
     ] {

@@ -30,6 +30,10 @@ CASES = [
         dict(controller="robust", known={"tau": 7, "gain": 1.5}, overshoot_percent=3),
         ["--known", "tau=7", "--known", "gain=1.5", "--overshoot-percent", 3],
     ),
+    (
+        dict(controller="robust", known={"tau": 7}, fall_back_percent=25, limit_v=1000),
+        ["--known", "tau=7", "--fall-back-percent", 25, "--limit-v", 1000],
+    ),
     (dict(controller="paper", rate_hz=500, slew_v_per_s=2000.0, dac_bits=16), ["--rate-hz", 500, "--slew-v-per-s", 2000, "--dac-bits", 16]),
 ]
 

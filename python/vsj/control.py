@@ -100,7 +100,8 @@ class Controller:
         Overshoot that the controller ``"robust"`` may cause, in percent of a step, 0 to 20; default: 2.
     fall_back_percent : float, optional
         Part of a step by which the controller ``"robust"`` may let all springs fall back for a while without a sensor, so that the slow
-        ones then stay above 97 % earlier, in percent, 0 to 50; default: 0.
+        ones then stay above 97 % earlier, in percent, 0 to 50; default: 0. No effect unless the share is known better than the time
+        constant.
     rate_hz : float
         Ticks per second, 100 to 10 000.
     feedback : Feedback, optional

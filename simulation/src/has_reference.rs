@@ -154,6 +154,24 @@ fn slew<P>(settings: &Settings<P>) -> f64 {
     amplifier.slew_v_per_s.filter(acts).unwrap_or(f64::INFINITY)
 }
 
+/// The robust controller of a spring.
+fn robust(spring: &Spring, margin: &Margin) -> Robust {
+    let Margin { time_constant, share, gain, overshoot, .. } = *margin;
+    let quick = spring.clone().times(1.0 - time_constant, 1.0 + share);
+    let fall_back = FallBack::design(margin, quick.steepest_slope());
+    Robust { quick, gain, overshoot, fall_back }
+}
+
+/// What the user should know about a fall back that is allowed and brings no spring within the errors of `margin` into the band earlier.
+pub fn remark_on_fall_back(plant: ExtendedPlant, margin: &Margin) -> Option<String> {
+    let inert = margin.fall_back > 0.0 && robust(&plant.into(), margin).fall_back.is_none();
+    inert.then(|| {
+        "--fall-back-percent has no effect: a fall back brings the slow springs into the band earlier only where the time constant is known \
+         less well than the share, to 4 % or more"
+            .to_owned()
+    })
+}
+
 impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
     fn from(settings: &Settings<P>) -> Self {
         let spring: Spring = settings.plant.into();
@@ -165,12 +183,7 @@ impl<P: Copy + Into<Spring>> From<&Settings<P>> for SampledLoop {
                     Controller::ProportionalIntegral(gains.proportional, gains.integral_per_s)
                 }
                 Compensation::TimeOptimal(approach) => Controller::TimeOptimal(approach.time_constant_s),
-                Compensation::Robust(margin) => {
-                    let Margin { time_constant, share, gain, overshoot, .. } = margin;
-                    let quick = spring.clone().times(1.0 - time_constant, 1.0 + share);
-                    let fall_back = FallBack::design(&margin, quick.steepest_slope());
-                    Controller::Robust(Robust { quick, gain, overshoot, fall_back })
-                }
+                Compensation::Robust(margin) => Controller::Robust(robust(&spring, &margin)),
             },
             spring,
             range_v: (settings.amplifier.min_v, settings.amplifier.max_v),

@@ -1,7 +1,7 @@
 //! The loop at the controller's rate in double precision, which the fixed-point tick must agree with.
 //!
-//! Written from the equations, independently of the `model` crate, from which it takes numbers only. Limits are
-//! clamped, and the [spring]'s step is exact for a voltage held between ticks.
+//! Written from the equations, independently of the `model` crate, from which it takes numbers only, and the design of a fall back, which is in
+//! double precision there. Limits are clamped, and the [spring]'s step is exact for a voltage held between ticks.
 //!
 //! - Proportional-integral: a proportional and an integral part with back-calculation as anti-windup. A nonlinear spring is
 //!   linearised around the last voltage with the steepest slope that it has anywhere.
@@ -67,11 +67,20 @@ pub struct State {
     quick: spring::State,
     target: f64,
     step: f64,
-    /// Largest lead in this step, as a part of it, since the quick spring was at the target, and whether the springs fall back; `None`
-    /// once they have.
-    falling: Option<(f64, bool)>,
+    phase: Phase,
     /// Half of the quick spring's lead when the target changed.
     lead_before: f64,
+}
+
+/// What a step has of its fall back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Never,
+    /// Largest lead in this step, as a part of it, since the quick spring was at the target.
+    Before(f64),
+    /// Number of ticks after which it ends.
+    Back(u32),
+    Over,
 }
 
 impl SampledLoop {
@@ -88,7 +97,7 @@ impl SampledLoop {
             quick,
             target: 0.0,
             step: 0.0,
-            falling: None,
+            phase: Phase::Never,
             lead_before: 0.0,
         }
     }
@@ -129,32 +138,43 @@ impl SampledLoop {
         let Robust { quick, gain, overshoot, fall_back } = robust;
         let stiffness = self.spring.stiffness(&state.spring);
         if target != state.target {
-            (state.target, state.step, state.falling) = (target, target - stiffness, Some((0.0, false)));
+            (state.target, state.step, state.phase) = (target, target - stiffness, Phase::Before(0.0));
             state.lead_before = 0.5 * (quick.stiffness(&state.quick) - stiffness);
         }
         let most = f64::max(0.0, (1.0 + overshoot) / (1.0 + gain) - 1.0) * state.step;
         let reached = quick.stiffness(&state.quick);
         let lead = reached - stiffness;
         let held = |part: f64| (part * lead).clamp(most.min(0.0), most.max(0.0));
-        let Some(fall_back) = fall_back else { return held(2.0 * overshoot / (overshoot + 0.03)) };
+        let usual = 2.0 * overshoot / (overshoot + 0.03);
+        let Some(fall_back) = fall_back else { return held(usual) };
         let lead_part = (lead - state.lead_before) / state.step;
-        if let Some((largest, falls)) = &mut state.falling
-            && (*falls || (target - reached) / state.step <= 1.0 / 32.0)
-        {
-            *largest = largest.max(lead_part);
-            let begins = !*falls && lead_part < *largest * (1.0 - 1.0 / 64.0) && lead_part <= fall_back.start;
-            *falls |= begins;
-            let jump = fall_back.jump * state.step;
-            let slewed =
-                FallBack::largest_jump_v(self.slew_v_per_s * self.sample_s, quick.settling_ticks(self.sample_s));
-            let after = state.voltage + jump;
-            let impossible = jump.abs() > slewed || after < self.range_v.0 || after > self.range_v.1;
-            if *falls && lead_part <= fall_back.end || begins && impossible {
-                state.falling = None;
+        let settling_ticks = quick.settling_ticks(self.sample_s);
+        state.phase = match state.phase {
+            Phase::Before(largest) if (target - reached) / state.step <= 1.0 / 32.0 => {
+                let largest = largest.max(lead_part);
+                let jump = fall_back.jump * state.step;
+                let slewed = FallBack::largest_jump_v(self.slew_v_per_s * self.sample_s, settling_ticks);
+                let after = state.voltage + jump;
+                let possible = jump.abs() <= slewed && after >= self.range_v.0 && after <= self.range_v.1;
+                let ends = -state.lead_before / state.step <= fall_back.end;
+                match lead_part < largest * (1.0 - 1.0 / 64.0) && lead_part <= fall_back.start {
+                    true if possible && ends => Phase::Back(FallBack::longest_ticks(settling_ticks)),
+                    true => Phase::Never,
+                    false => Phase::Before(largest),
+                }
             }
+            Phase::Back(ticks) => Phase::Back(ticks.saturating_sub(1)),
+            other => other,
+        };
+        match state.phase {
+            Phase::Back(ticks) if ticks == 0 || lead_part <= fall_back.end => state.phase = Phase::Over,
+            _ => (),
         }
-        let falls = matches!(state.falling, Some((_, true)));
-        held(fall_back.part) - if falls { fall_back.depth * state.step } else { 0.0 }
+        match state.phase {
+            Phase::Back(_) => held(fall_back.part) - fall_back.depth * state.step,
+            Phase::Over => held(fall_back.part),
+            _ => held(usual),
+        }
     }
 
     /// The voltage within the range that covers the approach's part of the distance to the target in the coming tick,

@@ -20,15 +20,10 @@ pub const CONTROLLERS: [(&str, Compensation); 4] = [
     ("none", Compensation::None),
     ("paper", Compensation::ProportionalIntegral(Gains::PAPER)),
     ("fast", Compensation::TimeOptimal(Approach { time_constant_s: 0.0 })),
+    // With a fall back, which a share that is known exactly allows.
     (
         "robust",
-        Compensation::Robust(Margin {
-            time_constant: 0.05,
-            share: 0.05,
-            gain: 0.01,
-            overshoot: 0.02,
-            ..Margin::TYPICAL
-        }),
+        Compensation::Robust(Margin { time_constant: 0.05, share: 0.0, gain: 0.01, overshoot: 0.02, fall_back: 0.25 }),
     ),
 ];
 

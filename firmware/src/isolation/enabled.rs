@@ -119,8 +119,8 @@ pub struct Isolation {
 }
 
 impl Isolation {
-    /// Creates the state in which no bank runs. Inlined, so that it is built in its place: it is too large for the stack, and a constant
-    /// would be 6 KB of zeros in the image.
+    /// Creates the state in which no bank runs. Inlined, so that it is built in its place: it is too large for the stack, and a
+    /// constant, of which nearly all is zero, would be in the image.
     #[inline(always)]
     pub const fn off() -> Self {
         Self {

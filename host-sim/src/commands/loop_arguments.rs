@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use simulation::control_loop::{Controller, Options, gains, lowered};
+use simulation::has_reference::remark_on_fall_back;
 use simulation::plant_file::PlantFile;
 
 use host_sim::output::terminal::remark;
@@ -60,6 +61,7 @@ impl LoopArguments {
         let controller = self.controller.unwrap_or(default);
         let gains = gains([kp, ki], controller, plant, rate_hz)?;
         lowered(&gains, [kp, ki]).iter().for_each(|text| remark(text));
+        margin.and_then(|margin| remark_on_fall_back(plant.extended(), &margin)).iter().for_each(|text| remark(text));
         let feedback = None;
         let options = Options {
             controller,

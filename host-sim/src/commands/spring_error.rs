@@ -63,7 +63,7 @@ pub(super) struct Known {
     #[arg(long, default_value_t = 2.0, value_name = "PERCENT", allow_negative_numbers = true, requires = "known")]
     overshoot_percent: f64,
     /// Part of a step by which the robust controller may let all springs fall back for a while, in percent, 0 to 50: without a sensor the
-    /// slow ones then stay above 97 % earlier
+    /// slow ones then stay above 97 % earlier, if the share is known better than the time constant
     #[arg(long, default_value_t = 0.0, value_name = "PERCENT", allow_negative_numbers = true, requires = "known")]
     fall_back_percent: f64,
 }

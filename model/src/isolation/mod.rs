@@ -256,8 +256,8 @@ pub struct State {
 }
 
 impl State {
-    /// Creates the state of a spring at rest at 0 V. Inlined, so that a program builds it in its place: as a constant it would be 5 KB of
-    /// zeros in an image, otherwise a copy on the stack.
+    /// Creates the state of a spring at rest at 0 V. Inlined, so that a program builds it in its place: as a constant, of
+    /// which nearly all is zero, it would be in the image, otherwise in a copy on the stack.
     #[inline(always)]
     pub const fn at_rest() -> Self {
         Self {

@@ -92,7 +92,7 @@ pub(crate) struct Robust<E: Estimator> {
     /// Error of the gain, and the reciprocal of 1 more.
     gain: Weight,
     of_gain: Weight,
-    /// Part of the unseen lead by which the target is moved.
+    /// Part of the unseen lead by which the target is moved, but from a fall back on.
     part: Weight,
     /// Overshoot that the quick spring may have where the sensor removes an error of the gain, and where it cannot.
     overshoot: Weight,
@@ -115,7 +115,7 @@ pub struct State<S> {
     /// Whether the sensor was trusted in the last tick.
     trusted: bool,
     phase: Phase,
-    /// Half of the lead that was unseen when the target changed.
+    /// Half of the lead that was unseen when the target changed; the lead of the present step counts from there.
     lead_before: Signal,
 }
 
@@ -130,7 +130,7 @@ impl Validated<'_, Margin> {
             quick: quick.estimator,
             gain: Weight::new(gain),
             of_gain: Weight::new(1.0 / (1.0 + gain)),
-            part: Weight::new(fall_back.map_or(2.0 * overshoot / (overshoot + MISSING), |design| design.part)),
+            part: Weight::new(2.0 * overshoot / (overshoot + MISSING)),
             overshoot: Weight::new(overshoot),
             overshoot_blind: Weight::new(((1.0 + overshoot) / (1.0 + gain) - 1.0).max(0.0)),
             rise: signal(RISE_V_PER_S * self.sample_time().seconds()),
@@ -159,7 +159,7 @@ impl<E: Estimator> Robust<E> {
             // What remains unseen is the same.
             state.seen = state.seen.saturating_sub(widened(self.by_gain(state, quick)));
             (state.base, state.trusted) = (quick, !blind);
-            state.phase = if changed && blind { Phase::Before(Signal::ZERO) } else { Phase::Over };
+            state.phase = if changed && blind { Phase::Before(Signal::ZERO) } else { Phase::Never };
         }
         let lead = self.lead(state, quick, aim.model);
         if let Some((feedback, correction, observed)) = feedback {
@@ -168,8 +168,8 @@ impl<E: Estimator> Robust<E> {
         let overshoot = if blind { self.overshoot_blind } else { self.overshoot };
         let (seen, most) = (upper(state.seen), saturated(overshoot.times(state.step)));
         let unseen = lead.saturating_sub(seen);
-        let fall = match &self.fall_back {
-            None => Signal::ZERO,
+        let (fall, part) = match &self.fall_back {
+            None => (Signal::ZERO, self.part),
             Some(thresholds) => {
                 if changed {
                     // A slow spring begins below the last target by what it still lacks, of which half remains at the end.
@@ -177,10 +177,12 @@ impl<E: Estimator> Robust<E> {
                 }
                 let gained = unseen.saturating_sub(state.lead_before);
                 let missing = aim.pursued.0.saturating_sub(quick);
-                thresholds.fall(&mut state.phase, state.step, gained, missing, aim.driven.0)
+                let leads = (state.lead_before, gained);
+                let fall = thresholds.fall(&mut state.phase, state.step, leads, missing, aim.driven.0);
+                (fall, thresholds.part(state.phase, self.part))
             }
         };
-        let unseen = saturated(self.part.times(unseen));
+        let unseen = saturated(part.times(unseen));
         let excess = unseen.max(most.min(Signal::ZERO)).min(most.max(Signal::ZERO));
         let wanted = aim.pursued.0.saturating_add(seen).saturating_add(excess).saturating_sub(fall);
         let wanted = self.without_gain(state, wanted);
@@ -209,7 +211,7 @@ impl<E: Estimator> Robust<E> {
         state.quick = *model;
         let quick = self.quick.predict(&state.quick, aim.applied).now;
         (state.target, state.step, state.base, state.trusted) = (aim.target.0, Signal::ZERO, quick, trusted);
-        state.phase = Phase::Over;
+        state.phase = Phase::Never;
         let lead = if trusted { self.lead(state, quick, aim.model) } else { Signal::ZERO };
         state.seen = widened(lead);
         let wanted = self.without_gain(state, aim.pursued.0.saturating_add(lead));

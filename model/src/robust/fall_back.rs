@@ -14,17 +14,21 @@ use crate::units::{SampleTime, Signal, lag_fraction, signal};
 
 /// Duration of the fall back, in time constants with which the voltage settles for a constant stiffness.
 const DURATION: f64 = 1.5;
-/// Part of a step by which the design stays within the band: what the time of the first approach and the DAC's codes change.
+/// Distance that the design keeps from the lower end of the band, as a part of a step, for the rounding to the DAC's codes and the time
+/// of the first approach.
 const RESERVE: f64 = 0.0005;
-/// Latest end that is tried, in time constants of the spring, and the number of bisections.
+/// Latest end of a fall back that is tried, in time constants of the spring.
 const LATEST: f64 = 4.0;
+/// Number of bisections of the end's time.
 const BISECTIONS: usize = 16;
 /// Times after the end at which the band is checked: their number, and their distance in the time constants of [`DURATION`].
 const CHECKED: (usize, f64) = (16, 0.4);
 /// Largest part of the lead by which the target is moved.
 const LARGEST_PART: f64 = 1.5;
-/// Longest time of the amplifier's slew for the return, in the time constants of [`DURATION`].
+/// Longest time in which the amplifier's slew has to make the return, in the time constants of [`DURATION`].
 const SLEWED: f64 = 0.3;
+/// Longest fall back, in planned ones: its end is a lead, which a step from an unsettled spring may never come down to.
+const LONGEST: f64 = 2.0;
 /// Part of the largest lead by which it has to have fallen before the fall back, as a shift to the right.
 const FALLEN_SHIFT: u32 = 6;
 
@@ -37,7 +41,7 @@ pub struct FallBack {
     pub start: f64,
     /// It ends when the lead is down to this.
     pub end: f64,
-    /// Part of the lead by which the target is moved.
+    /// Part of the lead by which the target is moved from the fall back on.
     pub part: f64,
     /// Change of the voltage at the return, in V per V of the step. Where range or slew do not allow it there is no fall back.
     pub jump: f64,
@@ -129,6 +133,11 @@ impl FallBack {
     pub fn largest_jump_v(slew_per_tick_v: f64, settling_ticks: f64) -> f64 {
         slew_per_tick_v * SLEWED * settling_ticks
     }
+
+    /// Returns the number of ticks after which a fall back ends, whatever the lead. `settling_ticks` as in [`FallBack::largest_jump_v`].
+    pub fn longest_ticks(settling_ticks: f64) -> u32 {
+        (LONGEST * DURATION * settling_ticks) as u32
+    }
 }
 
 /// The thresholds, quantized for the tick.
@@ -137,47 +146,54 @@ pub(super) struct Thresholds {
     depth: Weight,
     start: Weight,
     end: Weight,
+    part: Weight,
     jump: Weight,
     largest_jump: Signal,
+    longest_ticks: u32,
     range: (Signal, Signal),
 }
 
 /// What a step has of its fall back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// It has none, or has been through it.
+    /// It has none.
     #[default]
-    Over,
+    Never,
     /// The lead has not come down to the start yet; its largest magnitude since the quick spring was at the target.
     Before(Signal),
-    /// All springs are held back.
-    Back,
+    /// All springs are held back, for at most this number of ticks more.
+    Back(u32),
+    /// It has been through it.
+    Over,
 }
 
 impl Thresholds {
     /// Quantizes the thresholds for the quick spring's response behind an amplifier.
     pub(super) fn new(design: &FallBack, quick: &StepGain, amplifier: &Amplifier, sample_time: SampleTime) -> Self {
-        let FallBack { depth, start, end, jump, .. } = *design;
+        let FallBack { depth, start, end, part, jump } = *design;
         let settling_ticks = quick.feedthrough / quick.in_one_tick.max(1e-9);
         let jump_v = |step_v| FallBack::largest_jump_v(step_v, settling_ticks);
         Self {
             depth: Weight::new(depth),
             start: Weight::new(start),
             end: Weight::new(end),
+            part: Weight::new(part),
             jump: Weight::new(jump),
+            longest_ticks: FallBack::longest_ticks(settling_ticks),
             largest_jump: amplifier.slew_per_tick_v(sample_time).map_or(Signal::MAX, |step_v| signal(jump_v(step_v))),
             range: (signal(amplifier.min_v), signal(amplifier.max_v)),
         }
     }
 
-    /// Returns by how much the target of a `step` is lowered in this tick, with the sign of the step. `lead` is what the quick spring's lead over
-    /// the model has gained since the target changed, `missing` the quick spring's distance to the target, and `driven` the last voltage.
+    /// Returns by how much the target of a `step` is lowered in this tick, with the sign of the step. `before` is half the quick spring's lead
+    /// over the model when the target changed, `lead` what it has gained over that, `missing` the quick spring's distance to the target, and
+    /// `driven` the last voltage.
     #[inline(always)]
     pub(super) fn fall(
         &self,
         phase: &mut Phase,
         step: Signal,
-        lead: Signal,
+        (before, lead): (Signal, Signal),
         missing: Signal,
         driven: Signal,
     ) -> Signal {
@@ -186,7 +202,7 @@ impl Thresholds {
         let (size, lead) = (along(step), along(lead));
         let down_to = |part: Weight| lead <= saturated(part.times(size));
         match *phase {
-            Phase::Over => return Signal::ZERO,
+            Phase::Never | Phase::Over => return Signal::ZERO,
             Phase::Before(largest) => {
                 if along(missing) > size >> 5 {
                     return Signal::ZERO;
@@ -197,14 +213,145 @@ impl Thresholds {
                     let jump = saturated(self.jump.times(step));
                     let after = driven.saturating_add(jump);
                     let possible = along(jump) <= self.largest_jump && after >= self.range.0 && after <= self.range.1;
-                    *phase = if possible { Phase::Back } else { Phase::Over };
+                    // Where the springs still go the other way, the gained lead ends at what is taken off here, and not at the end.
+                    let ends = Signal::ZERO.saturating_sub(along(before)) <= saturated(self.end.times(size));
+                    *phase = if possible && ends { Phase::Back(self.longest_ticks) } else { Phase::Never };
                 }
             }
-            Phase::Back => (),
+            Phase::Back(ticks) => *phase = Phase::Back(ticks.saturating_sub(1)),
         }
-        if *phase == Phase::Back && down_to(self.end) {
-            *phase = Phase::Over;
+        match *phase {
+            Phase::Back(ticks) if ticks == 0 || down_to(self.end) => *phase = Phase::Over,
+            _ => (),
         }
-        if *phase == Phase::Back { saturated(self.depth.times(step)) } else { Signal::ZERO }
+        if matches!(*phase, Phase::Back(_)) { saturated(self.depth.times(step)) } else { Signal::ZERO }
+    }
+
+    /// Returns the part of the lead by which the target is moved, which is `usual` before a fall back.
+    #[inline(always)]
+    pub(super) fn part(&self, phase: Phase, usual: Weight) -> Weight {
+        if matches!(phase, Phase::Back(_) | Phase::Over) { self.part } else { usual }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+
+    fn volts(volts: f64) -> Signal {
+        signal(volts)
+    }
+
+    const LONGEST_TICKS: u32 = 5;
+
+    /// A quarter of the step is given up between leads of a half and a fifth of it.
+    fn thresholds() -> Thresholds {
+        let [depth, start, end, part, jump] = [0.25, 0.5, 0.2, 0.9, 2.0].map(Weight::new);
+        let range = (volts(0.0), volts(700.0));
+        Thresholds { depth, start, end, part, jump, largest_jump: volts(300.0), longest_ticks: LONGEST_TICKS, range }
+    }
+
+    /// What the target of a step is lowered by, and the phase after it, for some gained leads at the target under a voltage.
+    fn falls(step: f64, before: f64, leads: &[f64], driven: f64) -> (Vec<f64>, Phase) {
+        let mut phase = Phase::Before(Signal::ZERO);
+        let mut fall = |lead: &f64| {
+            let leads = (volts(before), volts(*lead));
+            thresholds().fall(&mut phase, volts(step), leads, Signal::ZERO, volts(driven)).to_num::<f64>()
+        };
+        let each = leads.iter().map(&mut fall).map(|volts| (volts * 100.0).round() / 100.0).collect();
+        (each, phase)
+    }
+
+    #[test]
+    fn springs_fall_back_between_the_two_leads_in_both_directions() {
+        let leads = [60.0, 80.0, 79.0, 51.0, 50.0, 21.0, 20.0, 10.0];
+        let expected = vec![0.0, 0.0, 0.0, 0.0, 25.0, 25.0, 0.0, 0.0];
+        assert_eq!(falls(100.0, 0.0, &leads, 400.0), (expected.clone(), Phase::Over));
+        let (down, up) = (leads.map(|lead| -lead), expected.iter().map(|fall| 0.0 - fall).collect::<Vec<_>>());
+        assert_eq!(falls(-100.0, 0.0, &down, 400.0), (up, Phase::Over));
+    }
+
+    /// The lead has to have been larger, and the quick spring at its target to a 32nd of the step.
+    #[test]
+    fn nothing_falls_back_before_the_lead_has_passed_its_largest_at_the_target() {
+        assert_eq!(falls(100.0, 0.0, &[30.0, 40.0, 45.0, 45.0], 400.0).0, [0.0; 4]);
+        // A 64th below the largest.
+        assert_eq!(falls(100.0, 0.0, &[48.0, 47.3, 47.2], 400.0).0, [0.0, 0.0, 25.0]);
+        let mut phase = Phase::Before(volts(80.0));
+        let mut fall = |missing: f64| {
+            thresholds().fall(&mut phase, volts(100.0), (Signal::ZERO, volts(40.0)), volts(missing), volts(400.0))
+        };
+        assert_eq!((fall(3.2), fall(3.1)), (Signal::ZERO, volts(25.0)));
+    }
+
+    #[test]
+    fn a_fall_back_ends_in_time_whatever_the_lead() {
+        let leads = [[80.0].as_slice(), &[40.0; 8]].concat();
+        let expected = vec![0.0, 25.0, 25.0, 25.0, 25.0, 25.0, 0.0, 0.0, 0.0];
+        assert_eq!(falls(100.0, 0.0, &leads, 400.0), (expected, Phase::Over));
+    }
+
+    /// A return of 200 V has to be within 0 to 700 V and 300 V of slew; the springs may go the other way by a fifth of the step.
+    #[test]
+    fn nothing_falls_back_that_could_not_return_or_end() {
+        let leads = [80.0, 40.0];
+        for (step, before, driven, is_possible) in [
+            (100.0, 0.0, 500.0, true),
+            (100.0, 0.0, 501.0, false),
+            (-100.0, 0.0, 200.0, true),
+            (-100.0, 0.0, 199.0, false),
+            (150.0, 0.0, 300.0, true),
+            (151.0, 0.0, 300.0, false),
+            (100.0, -20.0, 400.0, true),
+            (100.0, -21.0, 400.0, false),
+            (-100.0, 20.0, 400.0, true),
+            (-100.0, 21.0, 400.0, false),
+        ] {
+            let along = leads.map(|lead| lead * step / 100.0);
+            let (each, phase) = falls(step, before, &along, driven);
+            let expected = if is_possible { Phase::Back(LONGEST_TICKS) } else { Phase::Never };
+            assert_eq!((each[1] != 0.0, phase), (is_possible, expected), "{step} {before} {driven}");
+        }
+    }
+
+    #[test]
+    fn the_target_is_moved_by_another_part_of_the_lead_from_the_fall_back_on() {
+        let (of_design, usual) = (Weight::new(0.9), Weight::new(0.8));
+        for (phase, expected) in [
+            (Phase::Never, usual),
+            (Phase::Before(Signal::ZERO), usual),
+            (Phase::Back(1), of_design),
+            (Phase::Over, of_design),
+        ] {
+            assert_eq!(thresholds().part(phase, usual), expected, "{phase:?}");
+        }
+    }
+
+    /// Shares of 1/11; the numbers are those of the equations in the module's text, computed by another program.
+    #[test]
+    fn the_design_ends_where_the_slow_springs_are_in_the_band() {
+        let designed = |[time_constant, share, gain, fall_back]: [f64; 4]| {
+            let margin = Margin { time_constant, share, gain, overshoot: 0.02, fall_back };
+            FallBack::design(&margin, (1.0 + share) / 11.0)
+        };
+        for margin in [[0.05, 0.05, 0.0, 0.25], [0.03, 0.0, 0.0, 0.25], [0.0, 0.0, 0.0, 0.25], [0.05, 0.0, 0.0, 0.0]] {
+            assert_eq!(designed(margin), None, "{margin:?}");
+        }
+        for (margin, start, end) in [
+            ([0.05, 0.0, 0.0, 0.25], 0.033460, 0.021559),
+            ([0.05, 0.03, 0.0, 0.25], 0.031023, 0.017446),
+            ([0.07, 0.02, 0.0, 0.1], 0.031319, 0.022519),
+            ([0.07, 0.01, 0.005, 0.25], 0.026200, 0.011076),
+        ] {
+            let design = designed(margin).unwrap();
+            let near = |value: f64, expected: f64| (value - expected).abs() < 1e-4 * expected;
+            let [_, share, gain, fall_back] = margin;
+            let part = (1.02 / (1.0 + gain) - 1.0) / end;
+            assert!(near(design.start, start) && near(design.end, end), "{design:?}");
+            assert!(near(design.part, part) && near(design.jump, 11.0 * fall_back / (1.0 + share)), "{design:?}");
+        }
     }
 }

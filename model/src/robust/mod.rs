@@ -17,14 +17,16 @@
 //! seen'  = seen + L (lead - seen)                 at every reading, with the gain L of the sensor's correction,
 //!                                                 or 3/4 instead of L if that is what the correction has taken
 //! excess = part (lead - seen), at most overshoot |step|
-//! q + g (q - base)  ->  target - d + seen + excess
+//! fall   = depth step while the springs fall back, else 0
+//! q + g (q - base)  ->  target - d + seen + excess - fall
 //! ```
 //!
 //! - **Without a sensor** the slow springs lag behind the quick one, which is held above the target by up to the overshoot that is
 //!   allowed, until they are there: with `part = 2 overshoot / (overshoot + 3 %)` the band of -3 % to the overshoot is used on both
 //!   sides. An error of the gain cannot be removed; it uses up the overshoot that is allowed.
-//!   Where it is allowed ([`Margin::fall_back`]), all springs fall back by a part of the step once the quick one has been at its target,
-//!   as long as the lead is between two thresholds: the slow springs are in the band earlier, and the model's spring leaves it for a while.
+//!   Where it is allowed ([`Margin::fall_back`]), all springs fall back by a part of the step, `depth`, once the quick one has been at its
+//!   target, as long as the lead that this step has brought is between two thresholds, and no longer than twice the planned time: the
+//!   slow springs are in the band earlier, and the model's spring leaves it for a while. From then on `part` is that of the design.
 //! - **With a sensor** the correction `d` brings the model to the readings, as without this law. What has been seen needs no margin any
 //!   more: the margin lasts as long as the sensor takes to show an error, and not as long as the spring takes to settle. The voltage
 //!   rises by at most 20 V in a millisecond (falls, in a step downward), so that a spring whose share is larger than the margin shows that

@@ -10,17 +10,24 @@ use super::{FAST, tick};
 
 prop_compose! {
     /// Pre-compensators up to the ends of their allowed ranges.
-    fn compensation()(kind in 0..4u8, approach in 0.0..=1.0f64, gain in -3.0..2.0f64, integral in -4.0..2.0f64) -> Compensation {
+    fn compensation()(
+        kind in 0..4u8,
+        approach in 0.0..=1.0f64,
+        unknown in -1.0..=1.0f64,
+        gain in -3.0..2.0f64,
+        integral in -4.0..2.0f64,
+    ) -> Compensation {
         match kind {
             0 => FAST,
             1 => Compensation::TimeOptimal(Approach { time_constant_s: approach }),
             #[cfg(feature = "robust")]
             2 => Compensation::Robust(model::Margin {
                 time_constant: 0.25 * approach,
-                share: 0.25 * (1.0 - approach),
-                gain: 0.05 * (gain + 3.0),
-                overshoot: 0.2 * approach,
-                fall_back: 0.5 * (1.0 - approach),
+                // Known exactly in half of the draws: a fall back needs that.
+                share: 0.25 * unknown.max(0.0),
+                gain: 0.125 * gain.max(0.0),
+                overshoot: 0.2 * (integral + 4.0) / 6.0,
+                fall_back: 0.5 * unknown.abs(),
             }),
             _ => Compensation::ProportionalIntegral(Gains {
                 proportional: 10f64.powf(gain),

@@ -15,6 +15,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
 use crate::control_loop::{Controller, gains};
+use crate::has_reference::remark_on_fall_back;
 use crate::robust_bound::{Allowed, Needed, RobustBound};
 use crate::spring_error::{DifferingSpring, SpringError};
 use crate::tune::Specification;
@@ -83,11 +84,12 @@ pub(super) fn evaluate(
     let Knowledge { spring_error, within_s, fall_back } = *knowledge;
     let SpringError { time_constant, gain, .. } = spring_error;
     let overshoot = overshoot_percent / 100.0;
-    let (share, remarks) = share_margin(file.relaxation.share, &spring_error);
+    let (share, mut remarks) = share_margin(file.relaxation.share, &spring_error);
     let ends = spring_error.ends(&[-1.0, 0.0, 1.0]);
     ends.iter().try_for_each(|error| DifferingSpring::new(file, error).check())?;
     let drawn = drawn(&spring_error);
     let margin = Margin { time_constant, share, gain, overshoot, fall_back };
+    remarks.extend(remark_on_fall_back(file.extended(), &margin));
     let gains = gains([None; 2], Controller::Paper, file, specification.rate_hz)?;
     let compensations = [
         ("paper", Compensation::ProportionalIntegral(gains)),
