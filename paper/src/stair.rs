@@ -7,10 +7,11 @@ use model::{Compensation, Limits, Settings};
 use serde::Serialize;
 
 use crate::misprint::Pair;
-use crate::table3;
+use crate::table3::{self, Printed};
 use simulation::experiment::{Experiment, HasReference, Run, Sample, StartsFrom, max_fixed_point_error};
 use simulation::record::Record;
 use simulation::response::{Response, responses};
+use simulation::schedule::STAIR_STEP_V;
 
 /// The answer of `vsj stair --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -84,6 +85,8 @@ pub enum Rows<'a> {
         same: bool,
         /// True if the spring is the report's own, whose printed and measured values belong to the rows.
         spring: bool,
+        /// Size of the steps, in V.
+        step_v: f64,
     },
     /// A record of the user's.
     Record(&'a Record),
@@ -135,8 +138,9 @@ fn rows<P: HasReference>(experiment: &Experiment<P>, run: &Run, source: &Rows<'_
         }
     };
     let mut rows: Vec<Row> = match source {
-        Rows::Table3 { spring: false, .. } => {
-            table3::rows()?.iter().map(|printed| blank(printed.time_s, printed.voltage_v, None)).collect()
+        Rows::Table3 { spring: false, step_v, .. } => {
+            let voltage_v = |printed: &Printed| printed.voltage_v / STAIR_STEP_V * step_v;
+            table3::rows()?.iter().map(|printed| blank(printed.time_s, voltage_v(printed), None)).collect()
         }
         Rows::Table3 { .. } => table3::rows()?
             .iter()

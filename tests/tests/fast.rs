@@ -188,6 +188,7 @@ fn steps_are_within_the_range_of_the_spring() {
         ("volts.toml", units.replace('%', "V") + limit, &["--limit-v", "700"]),
         ("option.toml", units.to_owned(), &["--limit-v", "100"]),
         ("law.toml", units.to_owned() + law, &["--limit-v", "700"]),
+        ("range.toml", units.to_owned() + "[range]\nlowest_v = 0\nhighest_v = 70\n", &["--limit-v", "700"]),
     ] {
         fs::write(folder.path().join(name), plant).unwrap();
         let answer = |command| json(folder.path(), &[&[command, "--plant", name, "--json"], options].concat());
@@ -199,7 +200,8 @@ fn steps_are_within_the_range_of_the_spring() {
         assert!(answer("tune")["fast"]["t97_s"].is_number(), "{name}");
         let stair = answer("stair");
         assert_eq!(stair["steps"][4]["to_v"], 50.0, "{name}");
-        if name != "law.toml" {
+        assert_eq!(stair["rows"].as_array().unwrap().last().unwrap()["voltage_v"], 50.0, "{name}");
+        if !["law.toml", "range.toml"].contains(&name) {
             let bound = answer("bound");
             assert!(bound["steps"][4]["known_s"].is_number() && bound["steps"][4]["to_v"] == 50.0, "{name}: {bound}");
         }

@@ -111,6 +111,7 @@ impl Request<'_> {
             target => Rows::Table3 {
                 same: matches!(target, Target::Stair) && is_the_reports(&experiment.settings),
                 spring: self.paper,
+                step_v,
             },
         };
         let report = Report::new(&experiment, &run, &rows, self.controlled)?;
