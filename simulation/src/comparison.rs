@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::bad_input::BadInput;
 use crate::control_loop::{Controller, gains, lowered};
 use crate::experiment::{Experiment, HasReference, Run, StartsFrom, with_plant};
+use crate::has_reference::remark_on_fall_back;
 use crate::plant_file::PlantFile;
 use crate::response::{Response, from_present, measure, responses};
 use crate::schedule::{Change, Schedule};
@@ -107,7 +108,8 @@ pub fn compare(
     });
     let bound_from = ExtendedPlant::bounds_from(&settings(Amplifier::PAPER));
     let limits = limits.collect::<Result<_>>()?;
-    let remarks = lowered(&gains, [None; 2]);
+    let mut remarks = lowered(&gains, [None; 2]);
+    remarks.extend(margin.and_then(|margin| remark_on_fall_back(file.extended(), &margin)));
     Ok(Comparison {
         spring_error: actual.map(|actual| actual.spring_error),
         sensor_noise_v,

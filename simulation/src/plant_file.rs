@@ -290,7 +290,7 @@ impl PlantFile {
         Ok(())
     }
 
-    /// Checks that the range of the record has an end above its start.
+    /// Checks that the range of the record does not end below its start.
     fn check_range(&self) -> Result<(), OutOfRange> {
         let Some(Range { lowest_v, highest_v }) = self.range else { return Ok(()) };
         for (field, value, lowest) in
@@ -476,16 +476,19 @@ impl PlantFile {
 
     /// The size in V of the five steps of the stair on this spring behind an amplifier: the report's 100 V, or less where the stair would
     /// end at more than twice the recorded limit, the end of the law or the highest voltage from which the spring was identified, or beyond
-    /// the range of the amplifier, if the command is no voltage. Then its end is as far below as in the report, 500 of 700 V, and the step 1, 2 or 5 times a power of ten.
+    /// the range of the amplifier, if the command is no voltage. Then its end is as far below as in the report, 500 of 700 V, and the step
+    /// 1, 2 or 5 times a power of ten.
     pub fn stair_step_v(&self, amplifier: model::Amplifier) -> f64 {
         let recorded = self.amplifier.as_ref().and_then(|amplifier| amplifier.limit_v);
         let of_other_command = self.units.as_ref().and_then(UnitNames::other_command).map(|_| amplifier.max_v);
         let law_v = self.law.as_ref().and_then(|law| law.voltage_v.last().copied());
-        let identified_v = self.range.map(|range| range.highest_v);
+        let identified = |range: Range| if self.even { range.highest_v.max(-range.lowest_v) } else { range.highest_v };
+        // Of a stair, which is above 0 V, a range below says nothing.
+        let identified_v = self.range.map(identified).filter(|highest_v| *highest_v > 0.0);
         let own_v = recorded.into_iter().chain(law_v).chain(identified_v).fold(f64::INFINITY, f64::min);
         let range_v = of_other_command.unwrap_or(f64::INFINITY);
         let end_v = own_v.min(range_v);
-        if end_v <= 0.0 || range_v >= 5.0 * STAIR_STEP_V && own_v >= 2.5 * STAIR_STEP_V {
+        if end_v <= 0.0 || range_v >= 5.0 * STAIR_STEP_V && own_v >= 2.5 * STAIR_STEP_V * (1.0 - 1e-9) {
             return STAIR_STEP_V;
         }
         let most_v = end_v / 7.0 * (1.0 + 1e-9);

@@ -156,7 +156,7 @@ impl SampledLoop {
                 let slewed = FallBack::largest_jump_v(self.slew_v_per_s * self.sample_s, settling_ticks);
                 let after = state.voltage + jump;
                 let possible = jump.abs() <= slewed && after >= self.range_v.0 && after <= self.range_v.1;
-                let ends = -state.lead_before / state.step <= fall_back.end;
+                let ends = -state.lead_before / state.step <= fall_back.end.max(0.0);
                 match lead_part < largest * (1.0 - 1.0 / 64.0) && lead_part <= fall_back.start {
                     true if possible && ends => Phase::Back(FallBack::longest_ticks(settling_ticks)),
                     true => Phase::Never,

@@ -187,6 +187,18 @@ fn with_a_sensor_nothing_depends_on_the_fall_back() {
     assert!(codes(0.25, None) != codes(0.0, None), "there is a fall back");
 }
 
+/// Errors of the time constant for which the lead of the end is negative: only the step back takes the springs there.
+#[test]
+fn springs_also_fall_back_where_the_time_constant_is_known_badly() {
+    let codes = |fall_back: f64| {
+        let margin = Margin { time_constant: 0.2, share: 0.0, gain: 0.0, overshoot: OVERSHOOT, fall_back };
+        let settings = settings(Compensation::Robust(margin), None);
+        let samples = run(&settings, &SpringError::default(), &[(0.0, 1.0), (100.0, 30.0)], None);
+        samples.iter().map(|sample| sample.code).collect::<Vec<_>>()
+    };
+    assert!(codes(0.25) != codes(0.0));
+}
+
 /// A sensor with a noise of 1 V. A step that takes longer is as fast as that spring can be.
 #[test]
 fn with_a_sensor_every_spring_within_10_percent_takes_0_6_s_or_the_shortest_time() {

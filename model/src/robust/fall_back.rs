@@ -28,7 +28,7 @@ const LARGEST_PART: f64 = 1.5;
 /// Longest time in which the amplifier's slew has to make the return, in the time constants of [`DURATION`].
 const SLEWED: f64 = 0.3;
 /// Longest fall back, in planned ones: its end is a lead, which a step from an unsettled spring may never come down to.
-const LONGEST: f64 = 2.0;
+const LONGEST: f64 = 4.0;
 /// Part of the largest lead by which it has to have fallen before the fall back, as a shift to the right.
 const FALLEN_SHIFT: u32 = 6;
 
@@ -214,7 +214,8 @@ impl Thresholds {
                     let after = driven.saturating_add(jump);
                     let possible = along(jump) <= self.largest_jump && after >= self.range.0 && after <= self.range.1;
                     // Where the springs still go the other way, the gained lead ends at what is taken off here, and not at the end.
-                    let ends = Signal::ZERO.saturating_sub(along(before)) <= saturated(self.end.times(size));
+                    let ends =
+                        Signal::ZERO.saturating_sub(along(before)) <= saturated(self.end.times(size)).max(Signal::ZERO);
                     *phase = if possible && ends { Phase::Back(self.longest_ticks) } else { Phase::Never };
                 }
             }

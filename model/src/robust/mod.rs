@@ -25,7 +25,7 @@
 //!   allowed, until they are there: with `part = 2 overshoot / (overshoot + 3 %)` the band of -3 % to the overshoot is used on both
 //!   sides. An error of the gain cannot be removed; it uses up the overshoot that is allowed.
 //!   Where it is allowed ([`Margin::fall_back`]), all springs fall back by a part of the step, `depth`, once the quick one has been at its
-//!   target, as long as the lead that this step has brought is between two thresholds, and no longer than twice the planned time: the
+//!   target, as long as the lead that this step has brought is between two thresholds, and no longer than four times the planned time: the
 //!   slow springs are in the band earlier, and the model's spring leaves it for a while. From then on `part` is that of the design.
 //! - **With a sensor** the correction `d` brings the model to the readings, as without this law. What has been seen needs no margin any
 //!   more: the margin lasts as long as the sensor takes to show an error, and not as long as the spring takes to settle. The voltage

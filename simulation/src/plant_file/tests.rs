@@ -208,8 +208,10 @@ fn steps_of_the_stair_follow_the_range_of_the_spring() {
         (&range(-5.0, 240.0), 700.0, 20.0),
         (&range(0.0, 5.0), 700.0, 0.5),
         (&range(0.0, 430.0), 700.0, 100.0),
-        // Nothing is known of a stair, which is above 0 V.
-        (&range(-5.0, 0.0), 700.0, 100.0),
+        // Nothing is known of a stair, which is above 0 V, but for a spring that responds to the magnitude.
+        (&range(-70.0, 0.0), 700.0, 100.0),
+        (&format!("[units]\nvoltage = \"%\"\n{}", range(-70.0, 0.0)), 100.0, 10.0),
+        (&format!("even = true\n{}", range(-70.0, 1.0)), 700.0, 10.0),
     ] {
         assert!((step(more, amplifier_v) / expected - 1.0).abs() < 1e-12, "{more} {}", step(more, amplifier_v));
     }
