@@ -331,6 +331,19 @@ mod tests {
         }
     }
 
+    /// A voltage that settles with 500 ticks falls back for 750 ticks as planned, and returns within 150.
+    #[test]
+    fn a_fall_back_takes_up_to_four_planned_ones_and_its_return_a_part_of_one() {
+        assert_eq!(FallBack::longest_ticks(500.0), 3000);
+        assert!((FallBack::largest_jump_v(2.0, 500.0) - 300.0).abs() < 1e-9);
+        let quick = StepGain { feedthrough: 0.1, in_one_tick: 0.0002, relaxation: 0.0 };
+        let design = FallBack { depth: 0.25, start: 0.5, end: 0.2, part: 0.9, jump: 2.5 };
+        let amplifier = Amplifier { slew_v_per_s: Some(2000.0), ..Amplifier::up_to(1000.0) };
+        let thresholds = Thresholds::new(&design, &quick, &amplifier, SampleTime::from_rate(1000.0).unwrap());
+        assert_eq!((thresholds.longest_ticks, thresholds.largest_jump), (3000, volts(300.0)));
+        assert_eq!(thresholds.range, (volts(0.0), volts(1000.0)));
+    }
+
     /// Shares of 1/11; the numbers are those of the equations in the module's text, computed by another program.
     #[test]
     fn the_design_ends_where_the_slow_springs_are_in_the_band() {
