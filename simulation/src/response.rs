@@ -32,24 +32,30 @@ pub struct Response {
 /// Returns the time from the start of a change after which a loop's stiffness stays above a part of it, in s; `None` if it is below at the
 /// end.
 pub fn kept(run: &Run, samples: &[Sample], change: &Change, goal: f64) -> Option<f64> {
-    let Change { start_s, end_s, from_v, to_v } = *change;
-    let first = run.tick_at(start_s);
-    let last = run.tick_at(end_s).max(first + 1);
-    let part = |sample: &Sample| (sample.stiffness.to_f64() - from_v) / (to_v - from_v);
-    let window = &samples[first..last];
-    let below = window.iter().rposition(|sample| part(sample) < goal);
+    let (first, window) = window(run, samples, change);
+    let below = window.iter().rposition(|sample| part(change, sample) < goal);
     let after = below.map_or(0, |at| at + 1);
-    (after < window.len()).then(|| (run.time_s(first + after) - start_s).max(0.0))
+    (after < window.len()).then(|| (run.time_s(first + after) - change.start_s).max(0.0))
+}
+
+/// The samples of a change, and the tick of the first.
+fn window<'s>(run: &Run, samples: &'s [Sample], change: &Change) -> (usize, &'s [Sample]) {
+    let first = run.tick_at(change.start_s);
+    // The tick at the end may already belong to the next change.
+    let last = run.tick_at(change.end_s).max(first + 1);
+    (first, &samples[first..last])
+}
+
+/// How much of a change the stiffness has made.
+fn part(change: &Change, sample: &Sample) -> f64 {
+    (sample.stiffness.to_f64() - change.from_v) / (change.to_v - change.from_v)
 }
 
 /// Measures one loop of a run; the stiffness is interpolated linearly between ticks.
 pub fn measure(run: &Run, samples: &[Sample], change: &Change, bound_t97_s: Option<f64>) -> Response {
-    let Change { start_s, end_s, from_v, to_v } = *change;
-    let first = run.tick_at(start_s);
-    // The tick at the end may already belong to the next change.
-    let last = run.tick_at(end_s).max(first + 1);
-    let part = |sample: &Sample| (sample.stiffness.to_f64() - from_v) / (to_v - from_v);
-    let window = &samples[first..last];
+    let Change { start_s, from_v, to_v, .. } = *change;
+    let (first, window) = window(run, samples, change);
+    let part = |sample: &Sample| part(change, sample);
 
     let reaches = |goal: f64| {
         let after = window.iter().position(|sample| part(sample) >= goal)?;

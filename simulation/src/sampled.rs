@@ -166,9 +166,8 @@ impl SampledLoop {
             Phase::Back(ticks) => Phase::Back(ticks.saturating_sub(1)),
             other => other,
         };
-        match state.phase {
-            Phase::Back(ticks) if ticks == 0 || lead_part <= fall_back.end => state.phase = Phase::Over,
-            _ => (),
+        if matches!(state.phase, Phase::Back(ticks) if ticks == 0 || lead_part <= fall_back.end) {
+            state.phase = Phase::Over;
         }
         match state.phase {
             Phase::Back(_) => held(fall_back.part) - fall_back.depth * state.step,

@@ -1,88 +1,18 @@
-//! The law with its settings and state, built with the feature `robust`.
+//! The law with its state, built with the feature `robust`.
 
 use super::Aim;
 use super::fall_back::{FallBack, Phase, Thresholds};
+use super::margin::{MISSING, Margin};
 use crate::amplifier::Amplifier;
 use crate::coefficient::{Weight, saturated, sum, upper, widened};
-use crate::error::OutOfRange;
 use crate::estimator::{Estimator, Invertible};
 use crate::feedback::{self, Observed};
 use crate::time_optimal::{self, Approach, TimeOptimal};
-use crate::units::{Accumulator, SampleTime, Signal, Volts, signal};
-use crate::validated::{Validate, Validated};
+use crate::units::{Accumulator, Signal, Volts, signal};
+use crate::validated::Validated;
 
-/// Part of a step that may be missing when it counts as done: 97 % are reached.
-pub(super) const MISSING: f64 = 0.03;
 /// Largest change of the voltage in the direction of a step while the sensor is trusted, in V/s.
 const RISE_V_PER_S: f64 = 20e3;
-
-/// How well the spring is known, and what it may overshoot; all without a unit.
-///
-/// ```
-/// use model::{Compensation, Input, Margin, OutOfRange, Settings, State, Volts};
-///
-/// fn main() -> Result<(), OutOfRange> {
-///     // The share of 1/11 may be 10 % larger: a step of 90 V begins with less than the 988 V of the model's share.
-///     let margin = Margin { time_constant: 0.05, share: 0.1, ..Margin::TYPICAL };
-///     let amplifier = model::Amplifier::up_to(1000.0);
-///     let settings = Settings { compensation: Compensation::Robust(margin), amplifier, ..Settings::PAPER };
-///     let config = settings.validate()?.quantize();
-///     let input = Input { target: Volts::new(90.0)?, ..Input::default() };
-///     assert_eq!(config.tick(&mut State::default(), input).applied.to_f64().round(), 898.0);
-///     Ok(())
-/// }
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Margin {
-    /// Largest relative error of all time constants, both ways, 0 to 0.25.
-    pub time_constant: f64,
-    /// Largest relative error of the instantaneous share, both ways, 0 to 0.25.
-    pub share: f64,
-    /// Largest relative error of the gain, both ways, 0 to 0.25.
-    pub gain: f64,
-    /// Overshoot that is allowed on any spring within the errors, as a part of the step, 0 to 0.2.
-    pub overshoot: f64,
-    /// Part of a step by which all springs may fall back for a while, so that the slow ones are in the band earlier, 0 to 0.5; without a
-    /// sensor only. With 0 the spring without errors stays where it is once it is there.
-    pub fall_back: f64,
-}
-
-impl Margin {
-    /// Largest relative error of a parameter, both ways.
-    pub const LARGEST_ERROR: f64 = 0.25;
-
-    /// Time constants and share are known to within 5 %; the gain is exact, which no controller without a sensor can correct; 2 % of
-    /// overshoot are allowed, and no fall back.
-    pub const TYPICAL: Self = Self { time_constant: 0.05, share: 0.05, gain: 0.0, overshoot: 0.02, fall_back: 0.0 };
-
-    /// Returns the settings with these values, in the order of the fields, to be validated. `None` where the crate is built
-    /// without the feature `robust`.
-    pub const fn from_values(values: [f64; 5]) -> Option<Self> {
-        let [time_constant, share, gain, overshoot, fall_back] = values;
-        Some(Self { time_constant, share, gain, overshoot, fall_back })
-    }
-
-    /// Returns the settings in the order of their fields.
-    pub const fn values(&self) -> [f64; 5] {
-        let Self { time_constant, share, gain, overshoot, fall_back } = *self;
-        [time_constant, share, gain, overshoot, fall_back]
-    }
-
-    /// Returns the factors of the quick spring's time constants and share.
-    pub(crate) fn factors(&self) -> (f64, f64) {
-        (1.0 - self.time_constant, 1.0 + self.share)
-    }
-}
-
-impl Validate for Margin {
-    fn check(&self, _: SampleTime) -> Result<(), OutOfRange> {
-        OutOfRange::check("margin.time_constant", self.time_constant, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.share", self.share, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.gain", self.gain, 0.0..=Self::LARGEST_ERROR, "of the model's")?;
-        OutOfRange::check("margin.overshoot", self.overshoot, 0.0..=0.2, "of a step")?;
-        OutOfRange::check("margin.fall_back", self.fall_back, 0.0..=0.5, "of a step")
-    }
-}
 
 /// The pre-compensator for one spring and sample time, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -245,6 +175,8 @@ impl<E: Estimator> Robust<E> {
 mod tests {
     use super::*;
     use crate::estimator::{self, Plant};
+    use crate::units::SampleTime;
+    use crate::validated::Validate;
 
     fn law(gain: f64, overshoot: f64) -> Robust<estimator::Config> {
         let time = SampleTime::from_rate(1000.0).unwrap();

@@ -5,8 +5,7 @@
 //! takes this away from what the first step has left, until the second one has had time to add it again. The voltage of the shortest
 //! time, of `vsj bound`, does this as well. [`FallBack::design`] computes when; the tick compares the lead with two thresholds.
 
-use super::Margin;
-use super::enabled::MISSING;
+use super::margin::{MISSING, Margin};
 use crate::amplifier::Amplifier;
 use crate::coefficient::{Weight, saturated};
 use crate::estimator::StepGain;
@@ -221,9 +220,8 @@ impl Thresholds {
             }
             Phase::Back(ticks) => *phase = Phase::Back(ticks.saturating_sub(1)),
         }
-        match *phase {
-            Phase::Back(ticks) if ticks == 0 || down_to(self.end) => *phase = Phase::Over,
-            _ => (),
+        if matches!(*phase, Phase::Back(ticks) if ticks == 0 || down_to(self.end)) {
+            *phase = Phase::Over;
         }
         if matches!(*phase, Phase::Back(_)) { saturated(self.depth.times(step)) } else { Signal::ZERO }
     }

@@ -42,6 +42,8 @@ mod disabled;
 mod enabled;
 #[cfg(feature = "robust")]
 mod fall_back;
+#[cfg(feature = "robust")]
+mod margin;
 
 #[cfg(not(feature = "robust"))]
 pub(crate) use disabled::Robust;
@@ -50,9 +52,11 @@ pub use disabled::{Margin, State};
 #[cfg(feature = "robust")]
 pub(crate) use enabled::Robust;
 #[cfg(feature = "robust")]
-pub use enabled::{Margin, State};
+pub use enabled::State;
 #[cfg(feature = "robust")]
 pub use fall_back::FallBack;
+#[cfg(feature = "robust")]
+pub use margin::Margin;
 
 use crate::units::{Signal, Volts};
 

@@ -5,7 +5,8 @@
 //!   whose 95 % interval is the error, independently of the others.
 //! - *guaranteed*: the largest on the nominal spring and on those at all ends and middles of the intervals.
 //!
-//! t97, the time after which a step stays above 97 %, and overshoot are those of the worst step of the ideal stair. There is no sensor, so that the voltages are those of the nominal run.
+//! t97, the time after which a step stays above 97 %, and the overshoot are each the largest of the ideal stair's steps. There is no sensor, so
+//! that the voltages are those of the nominal run.
 
 use anyhow::Result;
 use model::{Compensation, Margin};
