@@ -155,8 +155,8 @@ impl<P: Pages> Store<P> {
         Ok(())
     }
 
-    /// Seals a block's new content if its payload is complete and `check` accepts it. If none was valid before, the other page is erased:
-    /// what is damaged there could be newer by its number, and valid again if its weak bits read right.
+    /// Seals a block's new content if its payload is complete and `check` accepts it. If none was valid before, its number is above that of
+    /// the damaged page, which may be valid again if its weak bits read right, and that page is erased.
     ///
     /// # Errors
     /// The [`Reason`] for rejecting the content; the old one remains valid.
@@ -173,9 +173,13 @@ impl<P: Pages> Store<P> {
         }
         let page = self.unused(block);
         let old = self.newest(block).map(|(id, _)| id.number);
-        let number = old.unwrap_or(0).wrapping_add(1);
-        let payload = self.pages.bytes(page).get(HEADER..HEADER + usize::from(length)).ok_or(Reason::Damaged)?;
-        let id = BlockId::of(number, payload);
+        let number = old.or(self.damaged_number(block)).unwrap_or(0).wrapping_add(1);
+        // Its words have not been read before: a bad one is a checksum that is not the host's.
+        let written = self.pages.tolerate_bit_errors(|| {
+            let payload = self.pages.bytes(page).get(HEADER..HEADER + usize::from(length))?;
+            Some((BlockId::of(number, payload), payload))
+        });
+        let (id, payload) = written.ok_or(Reason::Damaged)?;
         if id.checksum != checksum {
             return Err(Reason::Damaged);
         }
@@ -186,7 +190,7 @@ impl<P: Pages> Store<P> {
         match self.newest(block) {
             Some((stored, _)) if stored == id => {
                 if old.is_none() {
-                    // The new content is valid whether or not this succeeds.
+                    // The new content is the newest whether or not this succeeds.
                     let _ = self.pages.erase(Page { block, side: page.side.other() });
                 }
                 Ok(id)
@@ -215,6 +219,12 @@ impl<P: Pages> Store<P> {
         let newest = self.newest(block).map(|(id, _)| id.number);
         let is_damaged = |side: &Side| was_sealed(block, self.pages.bytes(Page { block, side: *side }), newest);
         self.pages.tolerate_bit_errors(|| [Side::A, Side::B].into_iter().find(is_damaged))
+    }
+
+    /// The number in the damaged page of a block.
+    fn damaged_number(&self, block: Block) -> Option<u32> {
+        let page = Page { block, side: self.damaged(block)? };
+        self.pages.tolerate_bit_errors(|| number(self.pages.bytes(page)))
     }
 
     /// The page for new content. A damaged one stays until the new content is sealed, so that a power cut does not hide the damage;
@@ -253,8 +263,12 @@ fn header(block: Block, id: &BlockId) -> [[u8; WORD]; 2] {
 
 /// The content and payload of a block's page, if it is sealed.
 fn open(block: Block, page: &[u8; PAGE]) -> Option<(BlockId, &[u8])> {
-    let ([_, [n0, n1, n2, n3, ..]], _) = page.as_chunks::<WORD>().0.split_first_chunk()?;
-    open_as(block, page, u32::from_le_bytes([*n0, *n1, *n2, *n3]))
+    open_as(block, page, number(page)?)
+}
+
+/// The number in a page, whether it is sealed or not.
+fn number(page: &[u8; PAGE]) -> Option<u32> {
+    page.get(WORD..)?.first_chunk().copied().map(u32::from_le_bytes)
 }
 
 /// The content and payload of a block's page, if it was sealed with this number.
