@@ -5,6 +5,7 @@ use model::{Amplifier, Approach, Compensation, Gains, Margin};
 use paper::stair::request::{Answer, Request, Target};
 use serde::{Deserialize, Serialize};
 use simulation::bad_input;
+use simulation::has_reference::remark_on_fall_back;
 use simulation::option_names::{SETTINGS, named};
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{MEASURED, Record};
@@ -110,10 +111,17 @@ pub fn run(control: &Control) -> Result<Shown> {
     };
     let targets = experiment.schedule.at_ticks(run.rate_hz);
     let left_out = plant.left_out();
+    let mut remarks = Vec::new();
+    if !left_out.is_empty() {
+        remarks.push(format!("not simulated: {}", left_out.join(", ")));
+    }
+    if let Compensation::Robust(margin) = &experiment.settings.compensation {
+        remarks.extend(remark_on_fall_back(plant.extended(), margin));
+    }
     let amplifier = &experiment.settings.amplifier;
     Ok(Shown {
         json: serde_json::to_string(report)?,
-        remarks: if left_out.is_empty() { vec![] } else { vec![format!("not simulated: {}", left_out.join(", "))] },
+        remarks,
         target: Curve::new(targets.len(), |tick| run.time_s(tick), |tick| targets[tick]),
         with: curve(&run.with, |sample| sample.stiffness.to_f64()),
         without: curve(&run.without, |sample| sample.stiffness.to_f64()),
@@ -204,6 +212,8 @@ mod tests {
         assert!(codes(&answer(&control, &plant).expect("a run")) == codes(&expected));
         let fast = Control { controller: "fast".to_owned(), ..control };
         assert!(codes(&answer(&fast, &plant).expect("a run")) != codes(&expected));
+        let inert = of(&request.replace("\"share\":3", "\"share\":9")).expect("a run").remarks;
+        assert!(inert.len() == 1 && inert[0].starts_with("a fall back by 20 % has no effect"), "{inert:?}");
         let error = of(&request.replace("\"tau\":7", "\"tau\":70")).expect_err("out of range").to_string();
         assert!(error.starts_with("--known: margin.time_constant = 0.7 is not allowed: "), "{error}");
     }

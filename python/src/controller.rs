@@ -12,6 +12,7 @@ use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::control_loop::{self, ControlLoop, Options};
 use simulation::experiment::MOST_TICKS;
+use simulation::has_reference::remark_on_fall_back;
 use simulation::open_loop;
 use simulation::plant_file::{self, PlantFile};
 use simulation::record::{Record, Row};
@@ -96,7 +97,9 @@ impl LoopOptions {
             rate_hz: self.rate_hz,
             feedback,
         };
-        Ok((options, control_loop::lowered(&gains, given)))
+        let mut remarks = control_loop::lowered(&gains, given);
+        remarks.extend(options.margin.and_then(|margin| remark_on_fall_back(plant.extended(), &margin)));
+        Ok((options, remarks))
     }
 }
 

@@ -225,3 +225,8 @@ def test_lowered_gains_are_said(tmp_path):
     plant.write_text("schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 0.002\n")
     with pytest.warns(vsj.RecordWarning, match="--kp 2.0668: the largest for this spring at this rate, instead of 4"):
         vsj.Controller(plant)
+
+
+def test_a_fall_back_without_effect_is_said():
+    with pytest.warns(vsj.RecordWarning, match="a fall back by 20 % has no effect within these errors"):
+        vsj.Controller(controller="robust", known={"tau": 5, "share": 5}, fall_back_percent=20)

@@ -166,8 +166,10 @@ fn robust(spring: &Spring, margin: &Margin) -> Robust {
 pub fn remark_on_fall_back(plant: ExtendedPlant, margin: &Margin) -> Option<String> {
     let inert = margin.fall_back > 0.0 && robust(&plant.into(), margin).fall_back.is_none();
     inert.then(|| {
-        "--fall-back-percent has no effect within these errors: a fall back helps where the time constant is known less well than share and gain"
-            .to_owned()
+        format!(
+            "a fall back by {} % has no effect within these errors: it helps where the time constant is known less well than share and gain",
+            (1e4 * margin.fall_back).round() / 100.0
+        )
     })
 }
 

@@ -211,6 +211,22 @@ fn steps_are_within_the_range_of_the_spring() {
     assert!(text(&said.stderr).ends_with(remark), "{}", text(&said.stderr));
 }
 
+/// At the errors that `--known` has by default.
+#[test]
+fn a_fall_back_that_has_no_effect_is_a_remark() {
+    let folder = tempdir().unwrap();
+    let stair: &[&str] = &["stair", "--controller", "robust", "--input", "step", "--out", "result"];
+    for command in [stair, &["compare"], &["tune", "--overshoot-percent", "2"]] {
+        let said = |share: &str| {
+            let options = ["--limit-v", "1000", "--known", "tau=5", "--known", share, "--fall-back-percent", "12.5"];
+            let output = run(folder.path(), &[command, &options].concat());
+            assert!(output.status.success(), "{}", text(&output.stderr));
+            text(&output.stderr).contains("a fall back by 12.5 % has no effect within these errors: it helps where")
+        };
+        assert!(said("share=5") && !said("share=0"), "{command:?}");
+    }
+}
+
 /// A spring without an instantaneous share, as a record shows it: the error of the share is a part of the response.
 #[test]
 fn a_share_near_zero_is_known_to_a_part_of_the_response() {
