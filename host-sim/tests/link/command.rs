@@ -1,7 +1,7 @@
 //! The command line of `vsj link`.
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -356,6 +356,34 @@ fn a_recording_names_each_verdict_that_comes_with_the_telemetry() {
             "{remarks}"
         );
         assert!(!remarks.contains("quiet"), "{remarks}");
+    }
+}
+
+/// Nobody commands anything meanwhile, so no command is refused.
+#[test]
+fn a_recording_names_a_fault_when_it_comes_and_fails_if_the_mcu_was_armed() {
+    let folder = tempfile::tempdir().unwrap();
+    for is_armed in [true, false] {
+        let mcu = Mcu::on_socket(Setup::default());
+        if is_armed {
+            good(&mcu.port, &["set", "100", "--arm"]);
+        }
+        let out = folder.path().join(format!("{is_armed}.csv"));
+        let mut recording = start(&mcu.port, &["record", out.to_str().unwrap(), "--seconds", "3"]);
+        let rows = || std::fs::read_to_string(&out).map_or(0, |text| text.lines().count());
+        while rows() < 20 {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        mcu.with(|shared| shared.fault = Some(supervisor::Fault::Watchdog));
+        let mut said = String::new();
+        BufReader::new(recording.stderr.as_mut().unwrap()).read_line(&mut said).unwrap();
+        assert!(said.contains("fault watchdog (5) at tick ") && said.ends_with("standing: watchdog (5)\n"), "{said}");
+        assert_eq!(recording.try_wait().unwrap(), None, "it goes on: {said}");
+        let ended = recording.wait_with_output().unwrap();
+        let (remarks, wrote) = (String::from_utf8(ended.stderr.clone()).unwrap(), stdout(&ended));
+        assert_eq!(ended.status.code(), Some(i32::from(is_armed)), "{remarks}");
+        assert_eq!(remarks.contains("no longer armed: faulted, fault watchdog (5)"), is_armed, "{remarks}");
+        assert!(wrote.starts_with("wrote ") && !remarks.contains(" at tick "), "{wrote} {remarks}");
     }
 }
 

@@ -135,6 +135,7 @@ fn follow(
         if start.elapsed() >= length || asked.elapsed() >= POLL || stopped() {
             asked = Instant::now();
             let state = session.client.capture_state().with_context(|| session.client.name().to_owned())?;
+            session.show_reports();
             if state.wanted != rows {
                 bail!("{}: the capture was replaced or lost: {state:?}", session.client.name());
             }

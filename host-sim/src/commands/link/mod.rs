@@ -39,7 +39,7 @@ The MCU ramps the voltage down when the host is silent for longer than its limit
 a command stays connected: --keep, watch or record. A request is repeated every 0.1 s until it is answered, for --timeout \
 seconds; the MCU applies it once.
 
-Exit codes: 0 success, 1 request rejected, no answer or connection lost, 2 bad arguments, a port that cannot be opened, a \
+Exit codes: 0 success, 1 request rejected, no answer, connection lost or a fault while armed, 2 bad arguments, a port that cannot be opened, a \
 stiffness out of reach, 128 + number after a signal: set, arm, watch, record and capture disable the output first. Ctrl-C is the usual \
 end of watch, record and --keep: exit code 0, unless a request waits for an answer."
 )]

@@ -72,28 +72,32 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, baud: u32) -> Re
     if arguments.arm {
         session.order(Request::Arm)?;
     }
+    let was_armed = arguments.arm || session.status.sample.state == link::State::Armed;
     session.order(Request::Stream { every_ticks: every.sample_ticks })?;
     let mut verdicts = Vec::new();
     let done = follow(session, schedule.as_ref(), whole, &mut recording, &mut verdicts);
     // The MCU would also stop by itself once the host is silent.
-    let stopped = session.order(Request::Stream { every_ticks: 0 });
+    let ended = session.order(Request::Stream { every_ticks: 0 });
     let finished = recording.finish();
     let (summary, file) = (recording.summary(), arguments.file.display());
     done.with_context(|| format!("{file} contains {} rows", summary.rows))?;
     finished?;
-    stopped?;
+    ended?;
     summary.remarks(&file.to_string()).iter().for_each(|text| remark(text));
     if session.json {
         let mut report = serde_json::to_value(summary)?;
         report["file"] = json!(arguments.file);
         report["isolation"] = json!(verdicts);
-        print(&format!("{report}\n"))
+        print(&format!("{report}\n"))?;
     } else {
-        print(&format!("wrote {file}: {} rows, {} s, {} samples lost\n", summary.rows, summary.seconds, summary.lost))
+        print(&format!("wrote {file}: {} rows, {} s, {} samples lost\n", summary.rows, summary.seconds, summary.lost))?;
     }
+    // After a signal nothing waits for another answer; the fault was named when it came.
+    if was_armed && !stopped() { session.not_faulted() } else { Ok(()) }
 }
 
-/// Records, and collects what the isolation bank says first and at each change of its verdict.
+/// Records, names the faults that the MCU reports as they come, and collects what the isolation bank says first and at each change of its
+/// verdict.
 fn follow(
     session: &mut Session,
     schedule: Option<&Schedule>,
@@ -116,6 +120,7 @@ fn follow(
         for sample in session.client.samples(wait).with_context(|| name.clone())? {
             recording.add(&sample)?;
         }
+        session.reports().for_each(|report| bar.suspend(|| remark(&report)));
         let report = session.client.verdict();
         let verdict = report.map(|report| report.verdict);
         if let Some(report) = report.filter(|_| verdict != last) {

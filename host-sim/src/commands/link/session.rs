@@ -69,18 +69,24 @@ impl Session {
         Ok(self.status)
     }
 
-    /// Names on stderr the faults that the MCU has reported since the last call.
-    fn show_reports(&mut self) {
-        for report in self.client.reports() {
-            let name = self.client.name();
+    /// Names on stderr the faults that the MCU has reported since the last call, which this program has confirmed or is about to.
+    pub(super) fn show_reports(&mut self) {
+        self.reports().for_each(|report| remark(&report));
+    }
+
+    /// The faults that the MCU has reported since the last call, a line each.
+    pub(super) fn reports(&mut self) -> impl Iterator<Item = String> {
+        let reports = self.client.reports();
+        let name = self.client.name();
+        reports.into_iter().map(move |report| {
             let standing: Vec<String> = report.faults().map(|fault| fault.to_string()).collect();
             let standing = if standing.is_empty() { "none".to_owned() } else { standing.join(", ") };
             let monitors = match report.mismatch.name() {
                 "none" => String::new(),
                 mismatch => format!(", monitors: {mismatch}"),
             };
-            remark(&format!("{name}: fault {} at tick {}{monitors}; standing: {standing}", report.fault, report.tick));
-        }
+            format!("{name}: fault {} at tick {}{monitors}; standing: {standing}", report.fault, report.tick)
+        })
     }
 
     /// What the isolation bank says; `None` if the MCU's program does not know the request.
@@ -147,6 +153,14 @@ impl Session {
             bail!("{}: no longer armed: {state}, fault {}", self.client.name(), self.status.fault);
         }
         Ok(())
+    }
+
+    /// Returns an error if the MCU has a fault, which has disabled an output that was armed.
+    pub(super) fn not_faulted(&mut self) -> Result<()> {
+        match self.refresh()?.sample.state {
+            state @ link::State::Faulted => self.still_armed(state),
+            _ => Ok(()),
+        }
     }
 
     /// Stays connected for `time`; returns an error if the MCU is no longer armed.
