@@ -34,7 +34,7 @@ Examples:
   vsj adapt --spring-error tau=20 --within tau=10   more than its bound allows
   vsj adapt --spring-error share=20 --json | jq .alone_in_time_from")]
 pub(crate) struct Arguments {
-    /// The stored model: `paper`, or a plant file with a share and one time constant only
+    /// The stored model: `paper`, or a plant file of at most 1 MiB with a share and one time constant only
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// Controller, unless --known chooses the robust one

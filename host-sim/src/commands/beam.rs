@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// Layers, with the columns of the report's Table 2; default: Table 2
     #[arg(long, value_name = "FILE.csv")]
     layers: Option<PathBuf>,
-    /// Order of the layers, bottom to top
+    /// Order of the layers, bottom to top, at most 20
     #[arg(long, default_value = ORDER, value_name = "MATERIAL,...")]
     stack: String,
     /// Voltage across the stack, in V

@@ -33,14 +33,14 @@ Examples:
   vsj isolate hv.csv --reading x_mm:mm --plant out/nominal/plant.toml
   vsj isolate record.csv --noise-v 0.5 --json | jq .last")]
 pub(crate) struct Arguments {
-    /// The record: a table with a header, or an MCAP or Parquet file; the voltage is held between the rows, which are at most 0.6 s
-    /// apart
+    /// The record: a table with a header, or an MCAP or Parquet file, of at most 1 000 000 rows and 512 MiB; the voltage is held between
+    /// the rows, which are at most 0.6 s apart
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
     #[command(flatten)]
     format: FormatArguments,
-    /// The nominal spring: `paper`, or a plant file with a share and one time constant only, whose [reading] converts the readings
-    /// to V of equivalent static voltage, but for --column
+    /// The nominal spring: `paper`, or a plant file of at most 1 MiB with a share and one time constant only, whose [reading] converts
+    /// the readings to V of equivalent static voltage, but for --column
     #[arg(long, default_value = "paper", value_name = "paper|FILE.toml")]
     plant: String,
     /// `tau`, `gain` or `share` of the nominal spring is known to within this, both ways, 0 to 25 %: errors within it raise no alarm;

@@ -43,8 +43,8 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     control: LoopArguments,
-    /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file with columns
-    /// time_s,voltage_v
+    /// `stair` with the report's 0.1 s ramps, `step` for the same stair as ideal steps, or a file of at most 1 000 000 rows and 512 MiB
+    /// with columns time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
     input: String,
     /// Interpolation of the voltage between two rows of an input file; default: hold

@@ -58,7 +58,8 @@ pub(crate) struct Arguments {
     /// Rows per second of a recording; 115 200 bit/s suffice for about 250
     #[arg(long, default_value_t = 100.0, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// What `p` plays: the report's stair, its ideal steps, or a file with columns time_s,voltage_v
+    /// What `p` plays: the report's stair, its ideal steps, or a file of at most 1 000 000 rows and 512 MiB with columns
+    /// time_s,voltage_v
     #[arg(long, default_value = "stair", value_name = "stair|step|FILE.csv")]
     input: String,
     /// Interpolation of the voltage between two rows of an input file

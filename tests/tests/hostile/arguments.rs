@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 
-use end_to_end::vsj::text;
+use end_to_end::vsj::{text, vsj};
 
 use crate::attack::Class;
 
@@ -76,4 +76,31 @@ fn every_list_has_a_bound_that_its_error_names() {
         let said = text(&output.stderr);
         (!said.contains(bound)).then(|| format!("`{bound}` is missing in: {said:.300}"))
     });
+}
+
+/// The bounds of the table in `docs/hostile-input.md`.
+#[test]
+fn every_bound_is_in_the_help_of_its_command() {
+    for (command, bounds) in [
+        (&["diagnose"][..], &["of at most 1 000 000 rows and 512 MiB", "A plant file has at most 1 MiB"][..]),
+        (&["identify"], &["of at most 1 000 000 rows and 512 MiB"]),
+        (&["isolate"], &["1 000 000 rows and 512 MiB", "a plant file of at most 1 MiB", "at most 16 MiB"]),
+        (&["stair"], &["1 000 000 rows and 512 MiB", "a plant file of at most 1 MiB"]),
+        (&["adapt"], &["a plant file of at most 1 MiB", "at most 16 MiB"]),
+        (&["bound"], &["a plant file of at most 1 MiB", "at most 16 MiB"]),
+        (&["tune"], &["a plant file of at most 1 MiB", "at most 16 MiB"]),
+        (&["compare"], &["a plant file of at most 1 MiB", "in V; at most 16"]),
+        (&["export", "model"], &["a plant file of at most 1 MiB"]),
+        (&["plan"], &["at most 64 MiB"]),
+        (&["log"], &["at most 256 MiB", "at most 1 000 000 lines"]),
+        (&["beam"], &["at most 100 voltages and 100 000 readings", "at most 1000", "at most 20"]),
+        (&["link"], &["How long to wait for the port to open, and for an answer"]),
+        (&["link", "PORT", "record"], &["1 000 000 rows and 512 MiB", "at most 1e9 s"]),
+    ] {
+        let help = text(&vsj().args(command).arg("--help").output().expect("vsj starts").stdout);
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        for bound in bounds {
+            assert!(help.contains(bound), "{command:?}: `{bound}` is missing in {help}");
+        }
+    }
 }

@@ -95,7 +95,12 @@ pub(crate) fn limited(folder: &Path, arguments: &[OsString]) -> Output {
 
 /// The command line of [`limited`].
 pub(crate) fn command(folder: &Path, arguments: &[OsString]) -> Command {
-    let limits = format!("ulimit -v {MEMORY_KIB}; ulimit -t {PROCESSOR_S}; ulimit -c 0; exec \"$0\" \"$@\"");
+    command_in(MEMORY_KIB, folder, arguments)
+}
+
+/// The command line of a run in this much address space, in KiB.
+pub(crate) fn command_in(memory_kib: u64, folder: &Path, arguments: &[OsString]) -> Command {
+    let limits = format!("ulimit -v {memory_kib}; ulimit -t {PROCESSOR_S}; ulimit -c 0; exec \"$0\" \"$@\"");
     let mut command = Command::new("sh");
     command.args(["-c", &limits]).arg(vsj().get_program()).args(arguments).current_dir(folder).stdin(Stdio::null());
     command.env("RUST_BACKTRACE", "0").stdout(Stdio::null());

@@ -1,8 +1,20 @@
 //! Records on which a diagnosis could take long or be misled.
 
+use std::ffi::OsString;
 use std::fmt::Write;
+use std::path::Path;
+use std::process::{Output, Stdio};
 
-use end_to_end::vsj::{json, run, text};
+use end_to_end::vsj::text;
+use serde_json::Value;
+
+use crate::attack;
+
+/// Runs `vsj` under the limits of every hostile run.
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let arguments: Vec<OsString> = arguments.iter().map(OsString::from).collect();
+    attack::command(folder, &arguments).stdout(Stdio::piped()).output().expect("sh starts")
+}
 
 /// A record of the report's spring from times and voltages, its readings changed by `reading`.
 fn record(rows: &[(f64, f64)], reading: impl Fn(f64) -> f64) -> String {
@@ -21,7 +33,9 @@ fn record(rows: &[(f64, f64)], reading: impl Fn(f64) -> f64) -> String {
 fn work(name: &str, table: &str) -> u64 {
     let folder = tempfile::tempdir().expect("there is room");
     std::fs::write(folder.path().join(name), table).expect("there is room");
-    let answer = json(folder.path(), &["diagnose", name, "--json"]);
+    let output = run(folder.path(), &["diagnose", name, "--json"]);
+    assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+    let answer: Value = serde_json::from_slice(&output.stdout).expect("one JSON object on stdout");
     let (work, allowed) = (&answer["search"]["work"], &answer["search"]["allowed"]);
     let (work, allowed) = (work.as_u64().expect("a count"), allowed.as_u64().expect("a count"));
     // The last step of a search may go on beyond.
@@ -119,4 +133,18 @@ fn a_record_that_is_too_long_for_its_rows_is_refused_with_its_row() {
         assert_eq!(output.status.code(), Some(if accepted { 0 } else { 2 }), "{last_s:e}: {said}");
         assert_eq!(said.contains("s after the first row; expected at most"), !accepted, "{last_s:e}: {said}");
     }
+}
+
+/// 300 MiB of comments around the rows, in less memory than that.
+#[test]
+fn a_large_file_with_few_rows_is_read_in_little_memory() {
+    let folder = tempfile::tempdir().expect("there is room");
+    let rows: Vec<(f64, f64)> = (0..40).map(|row| (0.1 * row as f64, 100.0 * (row / 10) as f64)).collect();
+    let comment = format!("# {}\n", "x".repeat((1 << 20) - 100)).repeat(150);
+    let path = folder.path().join("r.csv");
+    let table = record(&rows, |stiffness| stiffness);
+    std::fs::write(&path, format!("{comment}{table}{comment}")).expect("there is room");
+    let arguments = ["stair", "--input", "r.csv", "--json"].map(OsString::from);
+    let output = attack::command_in(256 << 10, folder.path(), &arguments).output().expect("sh starts");
+    assert!(output.status.success(), "{}", text(&output.stderr));
 }

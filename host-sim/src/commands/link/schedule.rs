@@ -21,8 +21,8 @@ const LONGEST_S: f64 = 1e9;
 /// The schedule as options.
 #[derive(Args, Debug)]
 pub(super) struct ScheduleArguments {
-    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v that
-    /// lasts at most 1e9 s
+    /// Command an armed MCU through the report's stair, its ideal steps, or a file with columns time_s,voltage_v, of at most
+    /// 1 000 000 rows and 512 MiB, that lasts at most 1e9 s
     #[arg(long, value_name = "stair|step|FILE.csv")]
     pub(super) input: Option<String>,
     /// Interpolation of the voltage between two rows of an input file
