@@ -8,6 +8,8 @@
 //! | [`watch`] | the running loop on a full screen |
 //! | [`qemu`] | the emulated board |
 //! | [`signals`] | what Ctrl-C and other signals do |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 /// Version and git revision, which the firmware's boot message carries too.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("GIT_REVISION"), ")");

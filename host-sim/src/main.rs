@@ -1,4 +1,6 @@
 //! `vsj`: host tools for the stiffness controller of a piezo variable-stiffness spring.
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod commands;
 

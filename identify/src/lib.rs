@@ -59,6 +59,8 @@
 //! | [`verdict`] | a search | what is reported |
 //! | [`examine`](mod@examine) | a record, options | the diagnosis: all passes in order |
 //! | [`plan`](mod@plan) | what a diagnosis leaves to decide | the schedule of the experiment that decides it |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod adequacy;
 pub mod answer;

@@ -9,6 +9,8 @@
 //! | [`not_disarmed`] | what to say of an MCU that has not confirmed that its output is disabled |
 //! | [`heartbeat`] | how often an armed MCU must hear of its host |
 //! | [`StatusReport`], [`IsolationRow`], [`AdaptationRow`], [`Row`] | status, isolation bank, adaptation and telemetry of the MCU, as text and JSON |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod client;
 mod command;

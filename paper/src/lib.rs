@@ -7,6 +7,8 @@
 //! | [`beam`], [`dynamics`], [`mod@joint`] | the report's models: leaf spring, how its stiffness changes, springs in a joint |
 //! | [`mod@reproduce`] | every printed number of the report, computed again |
 //! | [`figure`] | curves and points over common axes, to be drawn |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod beam;
 pub mod dynamics;

@@ -7,6 +7,8 @@
 //! | --- | --- |
 //! | `read` | the columns of a file, which go through the reader of CSV files |
 //! | `write` | a table as a file |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod read;
 mod write;

@@ -19,6 +19,8 @@
 //! | [`spring_error`] | the tick on a spring that differs from its model, with a sensor or without |
 //! | [`robust_bound`] | the shortest possible t97 for a spring that is known only to within errors |
 //! | [`comparison`], [`tune`] | controllers compared on the same steps; gains for a spring and the cost of a model error |
+// They panic on a closed pipe; `vsj` prints in its `output::terminal`.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod adaptation;
 pub mod bad_input;

@@ -36,6 +36,8 @@ fn folder() -> tempfile::TempDir {
     put("cut.bin", &log[..log.len() - 1]);
     put("spring.toml", include_bytes!("../../docs/plant.toml"));
     put("record.csv", &fs::read(sample).expect("the sample record is part of the repository"));
+    let diagnosis = run(folder.path(), &["diagnose", "record.csv", "--json"], Stdio::piped(), Stdio::null());
+    put("diagnosis.json", &diagnosis.stdout);
     folder
 }
 
@@ -47,14 +49,21 @@ const COMMANDS: &[(i32, &[&str])] = &[
     (0, &[]),
     (0, &["stair", "--plant", "spring.toml"]),
     (0, &["stair", "--json"]),
+    (0, &["adapt", "--spring-error", "gain=5"]),
     (0, &["beam", "--out", "out"]),
+    (0, &["bound", "--spring-error", "share=10"]),
     (0, &["compare", "--limit-v", "700"]),
     (0, &["diagnose", "record.csv"]),
     (0, &["dynamics", "zener"]),
+    (0, &["export", "model"]),
+    (0, &["identify", "record.csv"]),
+    (0, &["isolate", "record.csv"]),
     (0, &["joint"]),
     (0, &["log", "fw.elf", "log.bin"]),
     (0, &["log", "fw.elf", "log.bin", "--csv"]),
     (0, &["log", "fw.elf", "log.bin", "--json"]),
+    (0, &["man", "--out", "man"]),
+    (0, &["plan", "diagnosis.json", "--minutes", "1"]),
     (0, &["reproduce"]),
     (0, &["tune"]),
     (0, &["completions", "bash"]),
@@ -66,6 +75,19 @@ const COMMANDS: &[(i32, &[&str])] = &[
     (2, &["stair", "--limit-v", "-1"]),
     (2, &["jump"]),
 ];
+
+#[test]
+fn every_command_is_one_whose_output_is_lost() {
+    let help = text(&vsj().arg("--help").output().expect("vsj starts").stdout);
+    // A line of the list has the name two columns in, and further lines of its description none there.
+    let names = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names: Vec<&str> =
+        names.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.contains(&"diagnose") && names.len() > 15, "{names:?}");
+    for name in names.into_iter().filter(|name| *name != "help") {
+        assert!(COMMANDS.iter().any(|(_, arguments)| arguments.first() == Some(&name)), "{name}");
+    }
+}
 
 #[test]
 fn lost_output_ends_no_command_with_a_panic_or_a_signal() {

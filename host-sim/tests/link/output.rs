@@ -32,6 +32,7 @@ fn lost_output_never_ends_a_link_command_with_a_panic() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.csv");
     let record = ["record", out.to_str().unwrap(), "--force", "--seconds", "0.2", "--arm"];
+    let capture = ["capture", "--out", out.to_str().unwrap(), "--force", "--seconds", "0.05", "--arm"];
     for (code, arguments) in [
         (0, &["status"][..]),
         (0, &["status", "--json"]),
@@ -40,7 +41,11 @@ fn lost_output_never_ends_a_link_command_with_a_panic() {
         (0, &["watch", "--seconds", "0.2", "--every", "0.05"]),
         (0, &["watch", "--seconds", "0.2", "--every", "0.05", "--json"]),
         (0, &record),
+        (0, &capture),
         (0, &["disarm"]),
+        (0, &["isolation"]),
+        (0, &["adaptation"]),
+        (0, &["settings"]),
         (0, &["model"]),
         (0, &["model", "paper"]),
         (0, &["acknowledge", "panic"]),
