@@ -452,13 +452,14 @@ class Board:
             return 0xF
         if at == ADC1 + 0x40:
             # Channel 1 measures the amplifier's voltage, channel 2 no current, channel 18 the internal reference if
-            # ADC12_CCR.VREFEN is set; `monitors` overrides them.
+            # ADC12_CCR.VREFEN is set; `monitors` overrides them with a code, or with a function that returns one.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
             volts = self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
             voltage = min(round(volts * 4096 / MONITOR_SCALE), 4095)
             # DAC and ADC share their supply, so that an error of it cancels out; the current's zero is ignored.
             reference = round(VREFINT / self.supply * 4096) if self.regs.get(ADC1 + 0x308, 0) & 1 << 22 else 0
-            return self.monitors.get(channel, {1: voltage, 18: reference}.get(channel, 2048))
+            reading = self.monitors.get(channel, {1: voltage, 18: reference}.get(channel, 2048))
+            return reading() if callable(reading) else reading
         if at & ~0x1FFF == GPIO and at & 0x3FF == 0x10:
             port, pin = INTERLOCK
             # A broken wire reads as the pin's pull resistor sets it: low with the pull-down only.

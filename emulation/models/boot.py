@@ -13,7 +13,7 @@ import sys
 
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PRIMASK, UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_SP
 
-from board import BUTTON, FLASH, FMAC_IRQ, HZ, LSI, POWER_ON, RAM, Board
+from board import BUTTON, FLASH, FMAC_IRQ, HZ, LSI, MONITOR_SCALE, POWER_ON, RAM, Board
 
 FAULT_TICK = 300
 GUARD = 256  # Bytes at the end of the stack.
@@ -86,6 +86,23 @@ def mistaken(board):
 def oversupplied(board):
     """DAC and ADC are supplied with 3.6 V."""
     board.supply = 3.6
+
+
+def low(board):
+    """The amplifier stops at 60 V."""
+    board.monitors[1] = round(60 * 4096 / MONITOR_SCALE)
+
+
+def bridged(board):
+    """The output is short-circuited: no voltage, and 3 mA."""
+    shorted(board)
+    arcing(board)
+
+
+def slow_amplifier(board):
+    """The amplifier begins again from 0 V and rises by 1000 V/s."""
+    begin = board.now
+    board.monitors[1] = lambda: round((board.now - begin) / HZ * 1000 * 4096 / MONITOR_SCALE)
 
 
 def arcing(board):
@@ -269,6 +286,9 @@ if __name__ == "__main__":
         "no voltage": lambda: play(HOST, shorted, 480_000),
         "other amplifier": lambda: play(HOST, mistaken, 480_000),
         "supply of 3.6 V": lambda: play(HOST, oversupplied, 480_000),
+        "too low": lambda: play(HOST, low, 480_000),
+        "short circuit": lambda: play(HOST, bridged, 480_000),
+        "slow amplifier": lambda: play(HOST, slow_amplifier, 480_000),
         "current": lambda: play(HOST, arcing, 480_000),
         "replayed": lambda: play(HOSTS["recorded"], None, 1_000_000),
         "no random number": lambda: play(HOST, None, 200_000, random_number=0),

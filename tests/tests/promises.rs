@@ -50,14 +50,16 @@ fn rows(page: &str, header: &str) -> Vec<(String, String)> {
     rows
 }
 
-/// Whether `source` has a test of this name: a function whose attributes, above its documentation, contain `#[test]`.
+/// Whether `source` has a test of this name that runs: a function whose attributes, above or below its documentation, contain `#[test]` and
+/// not `#[ignore]`.
 fn has_test(source: &str, name: &str) -> bool {
     let lines: Vec<&str> = source.lines().map(str::trim_start).collect();
     let start = format!("fn {name}(");
     let at = lines.iter().position(|line| line.starts_with(&start));
     at.is_some_and(|at| {
         let above = lines[..at].iter().rev();
-        above.take_while(|line| line.starts_with("#[") || line.starts_with("//")).any(|line| *line == "#[test]")
+        let above: Vec<_> = above.take_while(|line| line.starts_with("#[") || line.starts_with("//")).collect();
+        above.iter().any(|line| **line == "#[test]") && !above.iter().any(|line| line.starts_with("#[ignore"))
     })
 }
 
@@ -187,7 +189,10 @@ fn drill(fault: Fault) -> &'static str {
         Fault::Watchdog => {
             "drill `hang`, drill `deaf`, drill `stall`, boot `hang`, boot `deaf`, boot `stalled tasks`, boot `stopped timer`, boot `halted`"
         }
-        Fault::Monitor => "boot `no voltage`, boot `current`, boot `supply of 3.6 V`",
+        Fault::Monitor => {
+            "boot `too low`, boot `slow amplifier`, boot `no voltage`, \
+             boot `short circuit`, boot `current`, boot `supply of 3.6 V`"
+        }
         Fault::Config => "drill `unguarded`, boot `unguarded`, boot `damaged settings`",
         Fault::Supply => "boot `dip`, boot `button while armed`",
         Fault::SelfTest => "boot `stuck bit`, boot `coupled bits`, boot `slow processor`",

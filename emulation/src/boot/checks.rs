@@ -73,6 +73,9 @@ pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Ve
         // The tick that takes 7.4 ms still ends; the next one, which follows it immediately, detects it.
         faulted("overrun", 8.0 * PERIOD_US + JITTER_US, Fault::Overrun, None, 1),
         monitor("no voltage", Mismatch::Open).of_variant(),
+        monitor("too low", Mismatch::Limit),
+        monitor("short circuit", Mismatch::Short),
+        monitor("slow amplifier", Mismatch::Slew),
         monitor("current", Mismatch::Leakage),
         monitor("supply of 3.6 V", Mismatch::Reference),
         check("torn", move |it| runs::torn(it, image)),
