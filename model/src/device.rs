@@ -23,8 +23,8 @@ use crate::validated::Validate;
 const RATES_HZ: (u32, u32) = (100, 2000);
 /// Clock of the tick's timer, in Hz: a period is a whole number of its cycles.
 const TIMER_HZ: u32 = 1_000_000;
-/// Longest round of the task watchdog, in ms: tasks check in every 10 ms, or after waiting for the line for up to 20 ms, or for a page of
-/// flash to be erased, 25 ms.
+/// Longest round of the task watchdog, in ms: tasks check in every 10 ms, or after waiting for the line for up to 20 ms, for the adaptation
+/// for up to 30 ms, or for a page of flash to be erased, 25 ms, which delays the others too.
 pub const LONGEST_ROUND_MS: u32 = 45;
 /// Largest tolerance of the voltage monitor, as a part of the amplifier's full scale.
 const MOST_TOLERANCE: f64 = 0.1;

@@ -92,8 +92,10 @@ fn verdict<'a>(server: &'a mut Server, view: &View) -> Option<&'a [u8]> {
     Some(server.verdict(verdict, &notice, view))
 }
 
-/// Sends a frame. False after a timeout: the frame is incomplete then, and the host drops it.
+/// Sends a frame. False after a timeout: the frame is incomplete then, and the host drops it. The task checks in before it waits for the
+/// line, because it may have waited for a page to be erased or for the adaptation, and that counts by itself.
 async fn send(line: &mut impl Line, bytes: &[u8]) -> bool {
+    TASK_WATCHDOG.check_in(Task::Link);
     let sent = with_timeout(WRITE_TIMEOUT, line.write(bytes)).await.is_ok();
     TASK_WATCHDOG.check_in(Task::Link);
     sent
