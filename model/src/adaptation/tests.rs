@@ -173,6 +173,82 @@ fn a_second_takeover_has_to_be_half_as_large_in_relation_to_what_runs() {
     }
 }
 
+/// A takeover that has removed the cause leaves little of the residual, whatever remains to be explained.
+#[test]
+fn an_unknown_cause_undoes_a_takeover_that_has_left_more_than_a_sixteenth_of_the_energy() {
+    let says = |verdict, since, energy| Observation {
+        report: Report::of(verdict, since, 0.125, energy),
+        ..seen(verdict, 0.125)
+    };
+    for (since, energy, kept) in [(100, 10, true), (100, 11, false), (300, 10, true), (300, 11, false)] {
+        let (mut state, mut exchanged) = (State::default(), false);
+        while state.phase() != Phase::Trial {
+            exchanged = update(&mut state, &Observation { exchanged, ..says(TAU, 100, 160) }).is_some();
+        }
+        update(&mut state, &Observation { exchanged, ..says(Verdict::Unknown, since, energy) });
+        let expected = if kept { Phase::Frozen } else { Phase::Returning };
+        assert_eq!(state.phase(), expected, "{energy} of 160 after {since} blocks");
+    }
+}
+
+/// An alarm without a name, in which the trial ends after four times its usual length.
+#[test]
+fn a_trial_that_never_becomes_quiet_is_confirmed_if_it_has_left_a_sixteenth_of_the_energy() {
+    for (energy, confirmed) in [(10, true), (11, false)] {
+        let (mut state, mut exchanged, mut blocks) = (State::default(), false, 0);
+        while state.phase() != Phase::Trial {
+            let seen = Observation { report: Report::of(TAU, 100, 0.125, 160), ..seen(TAU, 0.125) };
+            exchanged = update(&mut state, &Observation { exchanged, ..seen }).is_some();
+        }
+        while state.phase() == Phase::Trial {
+            let seen =
+                Observation { report: Report::of(Verdict::Alarm, 100, 0.0, energy), ..seen(Verdict::Alarm, 0.0) };
+            exchanged = update(&mut state, &Observation { exchanged, ..seen }).is_some();
+            blocks += 1;
+        }
+        assert_eq!(state.phase(), if confirmed { Phase::Watching } else { Phase::Returning }, "{energy} of 160");
+        assert_eq!(blocks, 401, "with the one in which the bank begins anew");
+    }
+}
+
+/// The deviation is 2^-10, the share 1 / 11 of the gain.
+#[test]
+fn the_precision_of_a_share_is_relative_to_the_share() {
+    for (precision, enough) in [(0.0205, false), (0.0215, true)] {
+        let settings = Settings { precision, ..Settings::TYPICAL };
+        let seen = seen(Verdict::Named(Cause::InstantaneousShare), 0.005);
+        let plant = Plant { share: 1.0 / 11.0, ..Plant::PAPER };
+        let moves = State::default().update(&settings, &seen, plant, RANGE_V, BLOCK_S).is_some();
+        assert_eq!(moves, enough, "{precision}");
+    }
+}
+
+/// Until the bank has begun anew it says what it said before.
+#[test]
+fn nothing_is_taken_over_before_the_bank_has_begun_anew() {
+    let mut state = State::default();
+    let named = seen(TAU, 0.125);
+    assert_eq!(update(&mut state, &Observation { trusted_blocks: 99, ..named }), Some(Parameters::STORED));
+    assert_eq!((update(&mut state, &named), state.phase()), (Some(Parameters::STORED), Phase::Watching));
+    update(&mut state, &Observation { exchanged: true, ..named });
+    assert_eq!(state.phase(), Phase::Moving);
+}
+
+#[test]
+fn without_a_trusted_sensor_it_is_frozen() {
+    let mut state = State::default();
+    for (trusted_blocks, phase) in [(0, Phase::Frozen), (1, Phase::Watching)] {
+        update(&mut state, &Observation { trusted_blocks, ..seen(Verdict::Quiet, 0.0) });
+        assert_eq!(state.phase(), phase);
+    }
+}
+
+#[test]
+fn phases_have_the_names_of_the_log() {
+    let names = ["watching", "moving", "settling", "trial", "frozen", "returning", "stopped", "off"];
+    assert_eq!(Phase::ALL.map(Phase::name), names);
+}
+
 #[test]
 fn a_named_cause_moves_its_parameter_slowly_and_is_confirmed_when_the_bank_is_quiet() {
     let (moves, state) = taken_over(Phase::Moving);

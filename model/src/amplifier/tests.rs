@@ -1,4 +1,5 @@
 use super::*;
+use crate::units::TWO_TO_20;
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -59,6 +60,24 @@ proptest! {
         let expected = (slew / rate * f64::from(ticks)).min(700.0);
         prop_assert!((drive.voltage.to_f64() - expected).abs() < 5e-5);
         prop_assert_eq!(drive.limits.intersects(Limits::SLEW), expected < 700.0);
+    }
+
+    /// Beyond the slew is only the part of a step that is carried over, one bit of a signal. A voltage within the range is never moved by it.
+    #[test]
+    fn no_tick_changes_the_voltage_by_more_than_the_slew(
+        slew in 1.0..500_000.0f64,
+        rate in 100.0..10_000.0f64,
+        (low, high) in (0.0..300.0f64, 400.0..700.0f64),
+        wanted in proptest::collection::vec(-2000.0..2000.0f64, 40),
+    ) {
+        let config = config(&Amplifier { slew_v_per_s: Some(slew), min_v: low, max_v: high, ..Amplifier::PAPER }, rate);
+        let mut state = State::default();
+        let voltages: Vec<f64> =
+            wanted.iter().map(|&wanted| config.drive(&mut state, volts(wanted), Limits::NONE).voltage.to_f64()).collect();
+        for (tick, pair) in voltages.windows(2).enumerate() {
+            let change = (pair[1] - pair[0]).abs();
+            prop_assert!(change <= slew / rate + 1.0 / TWO_TO_20, "tick {}: {} V at {} V/s", tick + 1, change, slew);
+        }
     }
 }
 

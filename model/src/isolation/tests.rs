@@ -4,6 +4,7 @@ use super::*;
 use crate::units::SampleTime;
 use crate::validated::Validate;
 use random_numbers::Xorshift32;
+use std::vec::Vec;
 
 fn config(rate_hz: f64) -> Config {
     let interval_s = f64::max(1e-3, 1.0 / rate_hz);
@@ -301,6 +302,69 @@ fn readings_are_pinned_below_the_model_by_more_than_three_deviations() {
         (state.means.pinned, state.means.residual) = (true, residual);
         config.assess(&mut state);
         assert_eq!(state.pinned, pinned, "{residual}");
+    }
+}
+
+/// Noise of 1 V in 128 readings of a block, and a range of 700 V.
+#[test]
+fn scales_are_those_of_noise_and_range() {
+    let config = config(1000.0);
+    let sigma_v = 1.0 / 128f64.sqrt();
+    let volts = |bits: i32| Signal::from_bits(bits).to_num::<f64>();
+    assert!((volts(config.pinned_below) + 3.0 * sigma_v).abs() < 1e-6);
+    // One deviation is 1024, after a jump of the range half of it, with 10 fraction bits.
+    let whitened = f64::from(config.whitening) / 2f64.powi(32) * sigma_v * 2f64.powi(20);
+    assert!((whitened - 1024.0).abs() < 1e-3, "{whitened}");
+    let jumps = Signal::from_num(1.0);
+    let jump = config.jump.times(jumps).to_num::<f64>();
+    assert!((jump - 512.0 / 700.0).abs() < 1e-5, "{jump}");
+}
+
+#[test]
+fn whitened_values_keep_24_bits_and_their_sign() {
+    let config = config(1000.0);
+    let mut state = State::at_rest();
+    state.vectors[..4].copy_from_slice(&[i32::MIN, i32::MAX, 0, 1 << 20]);
+    config.whiten(&mut state, 0);
+    let whitened: Vec<i32> = state.whitened[..4].iter().map(|values| values[0]).collect();
+    let deviation = 1024.0 * 128f64.sqrt();
+    assert_eq!(whitened[..3], [-(1 << 24), (1 << 24) - 1, 0]);
+    assert!((f64::from(whitened[3]) - deviation).abs() < 1.0, "{whitened:?}");
+}
+
+/// Both halves are whitened in two ticks, and no tick after them has work until the tests.
+#[test]
+fn the_ticks_between_the_parts_of_the_work_are_free() {
+    let config = config(1000.0);
+    let mut state = State::at_rest();
+    state.means.usable = true;
+    let next = |state: &mut State, step| {
+        config.work(state, step);
+        state.next
+    };
+    assert_eq!(next(&mut state, signatures::STEPS - 1), WHITEN);
+    assert_eq!((next(&mut state, WHITEN), next(&mut state, WHITEN + 1)), (WHITEN + 1, TEST));
+}
+
+#[test]
+fn with_the_sums_the_number_of_their_blocks_is_halved() {
+    for halve in [false, true] {
+        let mut state = State { blocks: 240, doubted: 10, held: 8, ..State::at_rest() };
+        state.mode.halve = halve;
+        config(1000.0).close(&mut state);
+        let expected = if halve { (120, 5) } else { (240, 10) };
+        assert_eq!(((state.blocks, state.doubted), state.held), (expected, 0));
+    }
+}
+
+#[test]
+fn a_sensor_is_released_only_after_it_was_pinned() {
+    let config = config(1000.0);
+    for was_pinned in [false, true] {
+        let mut state = State { pinned: was_pinned, ..State::at_rest() };
+        state.tests.highest = config.restart;
+        config.assess(&mut state);
+        assert_eq!(state.released, was_pinned);
     }
 }
 
