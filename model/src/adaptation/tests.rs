@@ -243,6 +243,43 @@ fn without_a_trusted_sensor_it_is_frozen() {
     }
 }
 
+/// A size that nothing determines has a deviation of 0.
+#[test]
+fn a_cause_without_a_size_changes_nothing() {
+    let mut state = State::default();
+    let report = Report::of(TAU, 100, 0.125, 50).without_size();
+    assert_eq!(report.size(), (0.0, 0.0));
+    assert_eq!(update(&mut state, &Observation { report, ..seen(TAU, 0.0) }), None);
+    assert_eq!(state.phase(), Phase::Watching);
+}
+
+/// Each smaller than half of the one before, and never quiet.
+#[test]
+fn after_four_takeovers_without_a_confirmation_all_are_undone() {
+    let (mut state, mut exchanged, mut size) = (State::default(), false, 0.125);
+    let mut takeovers = 0;
+    while state.phase() != Phase::Returning {
+        let before = state.phase();
+        exchanged = update(&mut state, &Observation { exchanged, ..seen(TAU, size) }).is_some();
+        if state.phase() == Phase::Moving && before != Phase::Moving {
+            takeovers += 1;
+            size *= 0.45;
+        }
+    }
+    assert_eq!(takeovers, 4);
+}
+
+#[test]
+fn the_output_of_the_loop_is_that_of_the_spring_times_the_gain() {
+    let volts = |volts: f64| Volts::new(volts).unwrap();
+    let config = control(Compensation::None).validate().unwrap().quantize();
+    let of_loop = config.tick(&mut ControlState::default(), Input { target: volts(100.0), measured: None });
+    let output = Scale::new(2.0).output(of_loop);
+    let twice = |volts: Signal| volts + volts;
+    assert_eq!((output.target, output.applied), (volts(200.0), of_loop.applied));
+    assert!(of_loop.stiffness.0 > Signal::ZERO && output.stiffness.0 == twice(of_loop.stiffness.0));
+}
+
 #[test]
 fn phases_have_the_names_of_the_log() {
     let names = ["watching", "moving", "settling", "trial", "frozen", "returning", "stopped", "off"];

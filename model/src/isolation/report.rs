@@ -101,4 +101,9 @@ impl Report {
         let none = i64::from(since_blocks) * (1 + i64::from(energy));
         Self { verdict, since_blocks, size, energies: (none << 20, 0), blocks: since_blocks }
     }
+
+    /// This report of a cause whose size the readings do not determine.
+    pub(crate) fn without_size(self) -> Self {
+        Self { size: Size::default(), ..self }
+    }
 }

@@ -305,6 +305,24 @@ fn readings_are_pinned_below_the_model_by_more_than_three_deviations() {
     }
 }
 
+#[test]
+fn each_cause_has_its_name_its_unit_and_its_bit() {
+    let units = ["", "", "", "", "", "", "V", "V", "V", "s/V", "s", "s", "V", "1/s", "", ""];
+    assert_eq!(Cause::ALL.map(Cause::unit), units);
+    for (cause, number) in Cause::ALL.into_iter().zip(0..) {
+        assert_eq!(Cause::named(cause.name()), Some(cause));
+        let set = Causes::NONE.with(cause).with(cause);
+        assert_eq!((set.bits(), set.contains(cause)), (1 << number, true));
+    }
+    assert_eq!(Cause::named("hum"), None);
+}
+
+#[test]
+fn a_block_is_the_shortest_of_at_least_100_ms() {
+    let ticks = [100.0, 1280.0, 1281.0, 10_000.0].map(bank::block_ticks);
+    assert_eq!(ticks, [128, 128, 256, 1024]);
+}
+
 /// Noise of 1 V in 128 readings of a block, and a range of 700 V.
 #[test]
 fn scales_are_those_of_noise_and_range() {

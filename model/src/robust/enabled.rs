@@ -206,6 +206,55 @@ mod tests {
         }
     }
 
+    /// Asks for a target, in V, with a model at rest at `model`, without a sensor.
+    fn ask(law: &Robust<estimator::Config>, state: &mut State<estimator::State>, target: f64, model: f64) -> Volts {
+        let volts = |volts: f64| Volts::new(volts).unwrap();
+        let (target, model) = (volts(target), volts(model).0);
+        let aim = Aim { target, pursued: target, model, driven: Volts::ZERO, applied: Volts::ZERO };
+        law.voltage(state, aim, None)
+    }
+
+    #[test]
+    fn a_step_begins_with_the_target_or_with_the_trust_in_the_sensor() {
+        let (law, mut state) = (law(0.1, 0.02), State::default());
+        ask(&law, &mut state, 100.0, 0.0);
+        assert_eq!((state.target, state.step), (Signal::from_num(100), Signal::from_num(100)));
+        assert!(!state.trusted && state.base == Signal::ZERO && state.phase == Phase::Before(Signal::ZERO));
+        (0..100).for_each(|_| law.run(&mut state, Volts::new(700.0).unwrap()));
+        ask(&law, &mut state, 100.0, 0.0);
+        assert_eq!(state.base, Signal::ZERO, "the same step");
+        ask(&law, &mut state, 200.0, 0.0);
+        let quick = state.base;
+        assert!(quick > Signal::ZERO && state.phase == Phase::Before(Signal::ZERO), "another step");
+        (0..100).for_each(|_| law.run(&mut state, Volts::new(700.0).unwrap()));
+        state.trusted = true;
+        ask(&law, &mut state, 200.0, 0.0);
+        assert!(!state.trusted && state.base > quick && state.phase == Phase::Never, "the trust is lost");
+    }
+
+    /// What remains unseen of the step before, half of which remains at the end of this one.
+    #[test]
+    fn with_a_fall_back_the_lead_of_a_step_counts_from_half_of_that_before() {
+        let margin = Margin { share: 0.0, fall_back: 0.25, ..Margin::TYPICAL };
+        let time = SampleTime::from_rate(1000.0).unwrap();
+        let quick = Invertible::new(Plant::PAPER.validate(time).unwrap(), 0.17);
+        let law = margin.validate(time).unwrap().quantize(quick, &Amplifier::up_to(1000.0));
+        let mut state = State::default();
+        (0..1000).for_each(|_| law.run(&mut state, Volts::new(700.0).unwrap()));
+        ask(&law, &mut state, 200.0, 40.0);
+        let lead = law.quick.predict(&state.quick, Volts::ZERO).now - Signal::from_num(40);
+        assert!(law.fall_back.is_some() && lead > Signal::from_num(10));
+        assert_eq!(state.lead_before, lead >> 1);
+    }
+
+    #[test]
+    fn the_lead_is_that_of_the_quick_spring_and_of_its_gain() {
+        let (law, volts) = (law(0.1, 0.02), |volts: i32| Signal::from_num(volts));
+        let lead = |trusted| law.lead(&State { base: volts(20), trusted, ..State::default() }, volts(120), volts(90));
+        assert_eq!(lead(false), volts(30));
+        assert!((lead(true) - volts(40)).abs() < Signal::from_num(1e-5));
+    }
+
     #[test]
     fn a_gain_is_taken_out_from_where_the_sensor_was_trusted() {
         let (law, volts) = (law(0.25, 0.02), |volts: i32| Signal::from_num(volts));

@@ -73,3 +73,17 @@ impl Validate for Margin {
         OutOfRange::check("margin.fall_back", self.fall_back, 0.0..=0.5, "of a step")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_in_the_order_of_the_fields() {
+        let values = [0.1, 0.05, 0.01, 0.02, 0.25];
+        let margin = Margin::from_values(values).unwrap();
+        assert_eq!(margin.values(), values);
+        assert_eq!((margin.time_constant, margin.share, margin.fall_back), (0.1, 0.05, 0.25));
+        assert_eq!(margin.factors(), (0.9, 1.05));
+    }
+}
