@@ -31,6 +31,7 @@ fn run(rig: &mut Rig, alone: &mut Alone, from: u64, to: u64) -> Vec<(u64, Change
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn the_model_follows_the_gain_and_goes_back_when_it_is_switched_off() {
     let settings = settings(Causes::NONE);
     let mut rig = Rig::new(&settings);
@@ -70,6 +71,7 @@ fn the_model_follows_the_gain_and_goes_back_when_it_is_switched_off() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn without_a_bank_or_without_settings_nothing_is_planned_and_the_report_says_why() {
     let with = settings(Causes::NONE);
     let blind = device::Settings { control: model::Settings { feedback: None, ..with.control }, ..with };
@@ -87,6 +89,7 @@ fn without_a_bank_or_without_settings_nothing_is_planned_and_the_report_says_why
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn an_exchange_waits_for_a_loop_that_is_settled_and_moves_no_code() {
     let settings = settings(Causes::NONE);
     let mut rig = Rig::new(&settings);
@@ -137,6 +140,7 @@ fn handed_over(in_time: bool) -> (u32, u32) {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
     let (plans, exchanges) = handed_over(false);
     assert!(plans > 5, "{plans}");
@@ -144,6 +148,7 @@ fn a_plan_that_comes_after_the_end_of_its_block_is_dropped() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_plan_that_comes_before_the_end_of_its_block_is_exchanged_there() {
     let (plans, exchanges) = handed_over(true);
     assert!(exchanges > 5 && exchanges <= plans, "{exchanges} of {plans}");

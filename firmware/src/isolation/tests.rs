@@ -99,6 +99,7 @@ fn the_start_of_a_fault_is_right_across_the_wrap_of_32_bits() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_change_of_the_gain_is_named_with_its_size_and_its_time_and_each_news_follows_the_one_before() {
     let mut rig = Rig::new(&settings(Causes::NONE));
     let news = stiffer(&mut rig);
@@ -118,6 +119,7 @@ fn a_change_of_the_gain_is_named_with_its_size_and_its_time_and_each_news_follow
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_spring_as_the_model_is_not_named_also_while_the_output_is_off_and_the_readings_are_those_of_no_voltage() {
     let mut rig = Rig::new(&settings(Causes::NONE));
     let mut quiet = true;
@@ -132,6 +134,7 @@ fn a_spring_as_the_model_is_not_named_also_while_the_output_is_off_and_the_readi
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn a_cause_of_the_trip_is_a_fault_until_it_is_acknowledged() {
     let trip = Causes::NONE.with(Cause::GainError);
     let mut rig = Rig::new(&settings(trip));
@@ -173,6 +176,7 @@ fn a_cause_of_the_trip_is_a_fault_until_it_is_acknowledged() {
 
 /// The acknowledgement of an alarm arrives between the tick that names a cause and the next one.
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn the_end_of_an_alarm_is_no_end_of_the_trip() {
     let mut rig = Rig::new(&settings(Causes::NONE.with(Cause::GainError)));
     rig.run(0, CHANGES, |_, _, _, _| ());
@@ -191,6 +195,7 @@ fn the_end_of_an_alarm_is_no_end_of_the_trip() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn another_cause_than_that_of_the_trip_is_no_fault() {
     let mut rig = Rig::new(&settings(Causes::NONE.with(Cause::StuckSensor)));
     let named = stiffer(&mut rig).iter().any(|(_, news)| news.report.verdict == Verdict::Named(Cause::GainError));
@@ -198,6 +203,7 @@ fn another_cause_than_that_of_the_trip_is_no_fault() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "slow under Miri")]
 fn without_what_the_bank_needs_it_says_nothing_and_why_and_a_trip_is_refused() {
     let trip = Causes::NONE.with(Cause::Drift);
     let blind = built_in(SETTINGS);
