@@ -173,7 +173,7 @@ impl<P: Pages> Store<P> {
         }
         let page = self.unused(block);
         let old = self.newest(block).map(|(id, _)| id.number);
-        let number = old.or(self.damaged_number(block)).unwrap_or(0).wrapping_add(1);
+        let number = old.or_else(|| self.damaged_number(block)).unwrap_or(0).wrapping_add(1);
         // Its words have not been read before: a bad one is a checksum that is not the host's.
         let written = self.pages.tolerate_bit_errors(|| {
             let payload = self.pages.bytes(page).get(HEADER..HEADER + usize::from(length))?;
