@@ -3,8 +3,8 @@
 CASE is a file with a JSON object. `tick` and `panic` are the addresses of the control tick and of `core::panicking::panic`, `rtt` is
 the log's, `main` that of the program's first function after start-up, `taken` that of `cortex_m::peripheral::TAKEN`, `stack` the top of
 the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each. `random`
-is what the random number generator delivers. `settings` and `model` are stored pages, in hex. `cuts` numbers, for each start, the
-operation of the flash that is cut. `runs` names the runs that are wanted.
+is what the random number generator delivers. `settings` and `model` are stored pages, in hex. `cuts` numbers for both, for each start,
+the operation of the flash that is cut. `runs` names the runs that are wanted.
 """
 
 import json
@@ -202,17 +202,21 @@ def faded(board):
     board.uc.mem_write(STORE[0] + 40, bytes([SETTINGS[40] ^ 4]))
 
 
-def cut(board):
-    """A model is stored, and after each start the chip is reset in the middle of one operation of the flash, as long as there are CUTS."""
-    board.uc.mem_write(STORE[2], MODEL)
-    cuts = list(CUTS)
+def cut(store, page, operations):
+    """A block is stored, and after each start the chip is reset in the middle of one operation of the flash, as long as there are any."""
 
-    def begun(number, begin, end):
-        if cuts and number == cuts[0]:
-            board.note("cut", cuts.pop(0))
-            board.cut_at((begin + end) // 2, BUTTON)
+    def before(board):
+        board.uc.mem_write(store, page)
+        cuts = list(operations)
 
-    board.flash.begun = begun
+        def begun(number, begin, end):
+            if cuts and number == cuts[0]:
+                board.note("cut", cuts.pop(0))
+                board.cut_at((begin + end) // 2, BUTTON)
+
+        board.flash.begun = begun
+
+    return before
 
 
 def protected(board):
@@ -259,6 +263,11 @@ def play(host, fault, until_us, torn=(), before=None, first=None, random_number=
     return board.log
 
 
+def answered(host):
+    """Time in us when what a host has sent is answered."""
+    return host[-1][0] + 100_000
+
+
 if __name__ == "__main__":
     with open(sys.argv[1], "rb") as file:
         IMAGE = file.read()
@@ -268,7 +277,7 @@ if __name__ == "__main__":
     FULL_SCALE, RANDOM, CUTS = CASE["volts"], CASE["random"], CASE["cuts"]
     SETTINGS, MODEL = bytes.fromhex(CASE["settings"]), bytes.fromhex(CASE["model"])
     HOSTS = {name: [(us, bytes.fromhex(frames)) for us, frames in sent] for name, sent in CASE["hosts"].items()}
-    HOST = HOSTS["host"]
+    HOST, SETTINGS_HOST, MODEL_HOST = HOSTS["host"], HOSTS["cut settings"], HOSTS["cut model"]
     RUNS = {
         "quiet": lambda: play([], None, 1_200_000),
         "host": lambda: play(HOST, stalled, 1_700_000),
@@ -309,7 +318,8 @@ if __name__ == "__main__":
         "halted": lambda: play(HOST, halted, 500_000),
         "flood": lambda: play(HOSTS["flood"], opened, 440_000),
         "sent": lambda: play(HOSTS["sent"], None, HOSTS["sent"][-1][0] + 100_000),
-        "cut": lambda: play(HOSTS["cut"], None, HOSTS["cut"][-1][0] + 100_000, before=cut),
+        "cut settings": lambda: play(SETTINGS_HOST, None, answered(SETTINGS_HOST), before=cut(STORE[0], SETTINGS, CUTS["settings"])),
+        "cut model": lambda: play(MODEL_HOST, None, answered(MODEL_HOST), before=cut(STORE[2], MODEL, CUTS["model"])),
         "protected page": lambda: play(HOSTS["protected"], None, HOSTS["protected"][-1][0] + 100_000, before=protected),
     }
     print(json.dumps({name: RUNS[name]() for name in CASE["runs"]}))

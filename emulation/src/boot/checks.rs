@@ -8,6 +8,7 @@ use xtask::variant::{Limit, Variant};
 
 use super::events::{Events, JITTER_US, PERIOD_US};
 use super::runs::{KILL_US, MONITOR_US};
+use super::schedule::Replacement;
 use super::{host, runs};
 
 /// Returns a line for the report, or an error that says what a run does not show.
@@ -37,8 +38,14 @@ impl Check<'_> {
     }
 }
 
-/// The checks of an image. `cuts` numbers the operations of the flash in which the chip is reset.
-pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Vec<Check<'a>> {
+/// The checks of an image. `settings` and `model` are what a host stores while the chip is reset, and the operations of the flash in which
+/// it is.
+pub(super) fn of<'a>(
+    image: &'a [u8],
+    variant: Variant,
+    settings: (&'a Replacement, &'a [usize]),
+    model: (&'a Replacement, &'a [usize]),
+) -> Vec<Check<'a>> {
     fn check<'a>(run: &'static str, shows: impl Fn(&Events) -> Result<String> + 'a) -> Check<'a> {
         Check { run, faults: 1, is_of_variant: false, shows: Box::new(shows) }
     }
@@ -88,7 +95,8 @@ pub(super) fn of<'a>(image: &'a [u8], variant: Variant, cuts: &'a [usize]) -> Ve
         check("halted", move |it| runs::deaf(it, image)),
         check("stalled tasks", move |it| runs::stalled(it, image)),
         check("sent", move |it| host::sent(it, variant)).with_faults(0).of_variant(),
-        check("cut", move |it| host::cut(it, cuts)).with_faults(cuts.len()),
+        check("cut settings", move |it| host::cut(it, settings.0, settings.1)).with_faults(settings.1.len()),
+        check("cut model", move |it| host::cut(it, model.0, model.1)).with_faults(model.1.len()),
         check("protected page", host::protected),
         check("replayed", move |it| runs::replayed(it, image)),
         check("no random number", move |it| runs::unrandom(it, image)),

@@ -25,7 +25,7 @@ use xtask::{python, segments, shell};
 use crate::binary::{audit, elf, size};
 use crate::variant;
 use events::Events;
-use schedule::{RANDOM, page};
+use schedule::{RANDOM, Replacement, page};
 
 /// Limits of this verification, printed after every run.
 const CANNOT_SHOW: &str = "\
@@ -37,7 +37,7 @@ not shown: real time (an instruction is one cycle here; no wait states, no conve
 pub(crate) struct Args {
     #[command(flatten)]
     variant: Variant,
-    /// Every image: each controller with each amplifier, and a reset in each operation of the flash with which a model is stored
+    /// Every image: each controller with each amplifier, and a reset in each operation of the flash with which a block is stored
     #[arg(long, conflicts_with_all = ["controller", "limit_v", "brief"])]
     all: bool,
     /// Only the runs in which controller or amplifier matter
@@ -47,12 +47,12 @@ pub(crate) struct Args {
 
 /// Runs the image of a variant, or those of all.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let last = schedule::operations()? - 1;
     if args.all {
-        let every: Vec<usize> = (0..=last).collect();
-        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, &every, false).map(drop));
+        let every = |operations: usize| (0..operations).collect();
+        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, every, false).map(drop));
     }
-    let faults = one(args.variant, &[0, last / 2, last - 1, last], args.brief)?;
+    let some = |operations: usize| vec![0, operations / 2, operations - 2, operations - 1];
+    let faults = one(args.variant, some, args.brief)?;
     if args.brief {
         return Ok(());
     }
@@ -60,9 +60,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Tally::now([faults])?.write(&args.variant.tally("boot"))
 }
 
-/// Builds the image, runs it once for each case, and prints what each run showed. `cuts` numbers the operations of the flash in which the
-/// chip is reset; a `brief` verification has only the runs in which controller or amplifier matter. Returns the number of injected faults.
-fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<usize> {
+/// Builds the image, runs it once for each case, and prints what each run showed. `cuts` chooses, of a number of operations of the flash,
+/// those in which the chip is reset; a `brief` verification has only the runs in which controller or amplifier matter. Returns the number
+/// of injected faults.
+fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, brief: bool) -> Result<usize> {
     let Settings { amplifier, .. } = variant::settings(variant);
     println!(
         "image of the {} controller, {} to {} V",
@@ -92,7 +93,10 @@ fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<usize> {
     let taken = elf::symbol(&bytes, "cortex_m::peripheral::TAKEN")?;
     let stack = elf::symbol(&bytes, "_stack_start")?;
     let python = python::environment(&shell::target_directory()?, "boot", "emulation/models/requirements.txt")?;
-    let mut checks = checks::of(&bytes, variant, cuts);
+    let replaced = Replacement::both(variant)?;
+    let [settings_cuts, model_cuts] = replaced.each_ref().map(|it| cuts(it.operations()));
+    let [settings, model] = &replaced;
+    let mut checks = checks::of(&bytes, variant, (settings, &settings_cuts), (model, &model_cuts));
     let all = checks.len();
     checks.retain(|check| !brief || check.is_of_variant);
     if brief {
@@ -109,9 +113,9 @@ fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<usize> {
         "stack": stack,
         "volts": amplifier.full_scale_v,
         "random": RANDOM,
-        "settings": schedule::hex(&page(Block::Settings, &schedule::settings(variant)?)?),
-        "model": schedule::hex(&page(Block::Model, &schedule::old_model()?)?),
-        "cuts": cuts,
+        "settings": schedule::hex(&page(Block::Settings, &settings.old)?),
+        "model": schedule::hex(&page(Block::Model, &model.old)?),
+        "cuts": { "settings": settings_cuts, "model": model_cuts },
         "runs": names,
         "hosts": {
             "host": schedule::armed().frames(RANDOM),
@@ -120,7 +124,8 @@ fn one(variant: Variant, cuts: &[usize], brief: bool) -> Result<usize> {
             "level": schedule::level().frames(RANDOM),
             "flood": schedule::flood().frames(RANDOM),
             "sent": schedule::sent(variant)?.frames(RANDOM),
-            "cut": schedule::cut(cuts.len())?.frames(RANDOM),
+            "cut settings": settings.cut(settings_cuts.len()).frames(RANDOM),
+            "cut model": model.cut(model_cuts.len()).frames(RANDOM),
             "protected": schedule::protected()?.frames(RANDOM),
         },
     });

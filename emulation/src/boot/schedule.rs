@@ -117,23 +117,54 @@ pub(super) fn sent(variant: Variant) -> Result<Schedule> {
     Ok(schedule)
 }
 
-/// Sends a model again after each of `cuts` resets, having asked what runs and armed; then restarts, asks what runs and acknowledges a
-/// fault of the stored model.
-pub(super) fn cut(cuts: usize) -> Result<Schedule> {
-    let model = model()?;
-    let mut schedule = Schedule::default();
-    for _ in 0..=cuts {
-        schedule.then(ERASE_US, Request::Hello);
-        for request in [Request::Model, Request::Arm, Request::Disarm] {
-            schedule.then(STEP_US, request);
-        }
-        schedule.send(Block::Model, &model);
+/// A block that is stored in place of another.
+pub(super) struct Replacement {
+    pub(super) block: Block,
+    /// Payload that is stored before.
+    pub(super) old: Vec<u8>,
+    /// Payload that a host sends.
+    pub(super) new: Vec<u8>,
+}
+
+impl Replacement {
+    /// Settings, and a model.
+    pub(super) fn both(variant: Variant) -> Result<[Self; 2]> {
+        Ok([
+            Self { block: Block::Settings, old: settings(variant)?, new: resetting_after(variant, 3 * WATCHDOG_MS)? },
+            Self { block: Block::Model, old: old_model()?, new: model()? },
+        ])
     }
-    schedule.then(ERASE_US, Request::Restart);
-    schedule.then(RESTART_US, Request::Hello);
-    schedule.then(STEP_US, Request::Model);
-    schedule.then(STEP_US, Request::Acknowledge(Fault::from(supervisor::Fault::Config)));
-    Ok(schedule)
+
+    /// The request that asks which block is stored and which runs.
+    const fn asked(&self) -> Request {
+        match self.block {
+            Block::Settings => Request::Settings,
+            Block::Model => Request::Model,
+        }
+    }
+
+    /// Number of operations of the flash with which the new block is stored: one that erases, and one for each word.
+    pub(super) fn operations(&self) -> usize {
+        1 + words(&self.new)
+    }
+
+    /// Sends the block again after each of `cuts` resets, having asked what runs and armed; then restarts, asks what runs and
+    /// acknowledges a fault of what was stored.
+    pub(super) fn cut(&self, cuts: usize) -> Schedule {
+        let mut schedule = Schedule::default();
+        for _ in 0..=cuts {
+            schedule.then(ERASE_US, Request::Hello);
+            for request in [self.asked(), Request::Arm, Request::Disarm] {
+                schedule.then(STEP_US, request);
+            }
+            schedule.send(self.block, &self.new);
+        }
+        schedule.then(ERASE_US, Request::Restart);
+        schedule.then(RESTART_US, Request::Hello);
+        schedule.then(STEP_US, self.asked());
+        schedule.then(STEP_US, Request::Acknowledge(Fault::from(supervisor::Fault::Config)));
+        schedule
+    }
 }
 
 /// Sends the first part of a model, then asks what runs and arms.
@@ -158,9 +189,14 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 
 /// Payload of settings that differ from the built-in ones of `variant` in the time of the watchdog.
 pub(super) fn settings(variant: Variant) -> Result<Vec<u8>> {
+    resetting_after(variant, STORED_RESET_MS)
+}
+
+/// Payload of the built-in settings of `variant` with a watchdog of `reset_ms`.
+fn resetting_after(variant: Variant, reset_ms: u32) -> Result<Vec<u8>> {
     let built_in = WireSettings::new(&built_in(variant::settings(variant)));
     let [hang_ms, stall_ms, _] = built_in.watchdogs_ms;
-    let settings = WireSettings { watchdogs_ms: [hang_ms, stall_ms, STORED_RESET_MS], ..built_in };
+    let settings = WireSettings { watchdogs_ms: [hang_ms, stall_ms, reset_ms], ..built_in };
     Ok(settings.payload().context("settings without a payload")?.to_vec())
 }
 
@@ -209,9 +245,4 @@ pub(super) fn page(block: Block, payload: &[u8]) -> Result<Vec<u8>> {
 /// Number of words with which a payload is stored: those of its parts, and two that seal it.
 pub(super) fn words(payload: &[u8]) -> usize {
     payload.len().div_ceil(block::PART) * block::PART / WORD + 2
-}
-
-/// Number of operations of the flash with which a model is stored: one that erases, and one for each word.
-pub(super) fn operations() -> Result<usize> {
-    Ok(1 + words(&model()?))
 }

@@ -2,14 +2,14 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::settings::WATCHDOG_MS;
-use link::{BlockId, Blocks, BrownOut, Fault, Reason, Reply, Request, State, WireVolts};
+use link::{Block, BlockId, Blocks, BrownOut, Fault, Reason, Reply, Request, State, WireVolts};
 use model::supervisor;
 use xtask::variant::Variant;
 
 use super::answers::{answers, expect, greets};
 use super::codes::{control, differ, driven, drives, equal, inside, orders, written};
 use crate::boot::events::{Events, JITTER_US, PERIOD_US, jitter};
-use crate::boot::schedule::{self, STORED_RESET_MS};
+use crate::boot::schedule::{self, Replacement, STORED_RESET_MS};
 use crate::variant;
 
 /// A run in which a host stores settings and an extended model with the image's own flash driver and restarts the chip: both run, and
@@ -81,28 +81,30 @@ pub(in crate::boot) fn sent(events: &Events, variant: Variant) -> Result<String>
     ))
 }
 
-/// A run in which the chip is reset in the middle of operations of the flash, in those of `cuts`, while a model is stored beside another:
+/// A run in which the chip is reset in the middle of operations of the flash, in those of `cuts`, while a block is stored beside another:
 /// the old one runs, or nothing can be armed, and the next transfer is stored.
-pub(in crate::boot) fn cut(events: &Events, cuts: &[usize]) -> Result<String> {
+pub(in crate::boot) fn cut(events: &Events, stored: &Replacement, cuts: &[usize]) -> Result<String> {
     ensure!(!events.0.iter().any(|event| event.1 == "dac" && event.2 != 0), "a voltage without a target");
     let starts = events.starts();
     ensure!(starts.len() == cuts.len() + 2, "{} starts after {} cuts and a restart", starts.len(), cuts.len());
     ensure!(events.times("cut").len() == cuts.len(), "not every operation is cut");
-    let (old, new) = (schedule::old_model()?, schedule::model()?);
-    let seal = schedule::operations()? - 1;
+    let seal = stored.operations() - 1;
     let mut config = 0;
     let mut last = None;
     for (start, events) in starts.iter().enumerate() {
         let answers = answers(&events.split("watchdog started")?.1)?;
+        let mut replies = answers.iter().map(|(.., reply)| reply);
         let status =
-            answers.iter().find_map(|(.., reply)| if let Reply::Status(status) = reply { Some(status) } else { None });
+            replies.clone().find_map(|reply| if let Reply::Status(status) = reply { Some(status) } else { None });
         let fault = status.with_context(|| format!("no status after start {start}"))?.fault;
-        let model =
-            answers.iter().find_map(|(.., reply)| if let Reply::Model(model) = reply { Some(model) } else { None });
-        let active = model.with_context(|| format!("no model after start {start}"))?.active;
-        let runs = if start <= cuts.len() { &old } else { &new };
+        let blocks = replies.find_map(|reply| match (stored.block, reply) {
+            (Block::Settings, Reply::Settings(blocks)) | (Block::Model, Reply::Model(blocks)) => Some(blocks),
+            _ => None,
+        });
+        let active = blocks.with_context(|| format!("not said what runs after start {start}"))?.active;
+        let runs = if start <= cuts.len() { &stored.old } else { &stored.new };
         ensure!((active.length, active.checksum) == frame_of(runs), "{active:?} runs after start {start}");
-        // In its last word it cannot be known what was stored, and nothing is armed until a model is.
+        // In its last word it cannot be known what was stored, and nothing is armed until another block is.
         let expected = if fault == Fault::NONE {
             Reply::Ack { state: State::Armed, target: WireVolts::from_f64(0.0) }
         } else {
@@ -122,8 +124,8 @@ pub(in crate::boot) fn cut(events: &Events, cuts: &[usize]) -> Result<String> {
     let last = answers.iter().rfind(|(.., reply)| !matches!(reply, Reply::Fault(_)));
     ensure!(last.is_some_and(|(.., reply)| *reply == acknowledged), "the fault stays: {answers:?}");
     Ok(format!(
-        "reset in the middle of {} of the {} operations of the flash that store a model: the old one ran each time, arming was refused \
-         where it could not be known what was stored ({config} starts), and the next model was stored; DAC zero throughout",
+        "reset in the middle of {} of the {} operations of the flash that store it: what was stored before ran each time, arming was \
+         refused where it could not be known what was stored ({config} starts), and the next transfer was stored; DAC zero throughout",
         cuts.len(),
         seal + 1
     ))
