@@ -172,6 +172,14 @@ impl<E: Estimator> Robust<E> {
 }
 
 #[cfg(test)]
+impl<S> State<S> {
+    /// Returns this state with the law's of another.
+    pub(crate) fn with_law_of(self, other: &Self) -> Self {
+        Self { law: other.law, ..self }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimator::{self, Plant};

@@ -103,17 +103,37 @@ fn targets() -> impl Strategy<Value = std::vec::Vec<(f64, u32)>> {
     prop::collection::vec((-900.0..1900.0f64, 1..3000u32), 1..6)
 }
 
-/// Quantizes a case; some gains are rejected for some springs, and some margins for some rates.
+/// Quantizes a case without a sensor; some gains are rejected for some springs, and some margins for some rates.
 fn config<P: Model>(plant: P, (rate_hz, compensation, amplifier): Loop) -> Result<Config<P::Config>, TestCaseError> {
-    let settings = Settings { rate_hz, plant, compensation, amplifier, feedback: None };
+    validated(&Settings { rate_hz, plant, compensation, amplifier, feedback: None })
+}
+
+fn validated<P: Model>(settings: &Settings<P>) -> Result<Config<P::Config>, TestCaseError> {
     let valid = settings.validate().map_err(|error| TestCaseError::reject(std::format!("{error}")))?;
     Ok(valid.quantize())
 }
 
-/// Puts `voltage` out without asking the pre-compensator. Returns what was put out.
-fn put_out<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, voltage: Volts) -> Volts {
+/// Puts `voltage` out without asking the pre-compensator, whatever the target. Returns what was put out.
+fn put_out<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, input: Input, voltage: Volts) -> Volts {
+    if let Some(feedback) = &config.feedback {
+        let target = config.amplifier.clamp_target(input.target).0;
+        let (corrected, observed) = feedback.update(&mut state.feedback, target, input.measured);
+        if let PreCompensator::Robust(it) = &config.pre_compensator {
+            // What it has seen of the lead follows the readings; its law is not asked.
+            let mut asked = *state;
+            config.robust(
+                it,
+                &mut asked,
+                target,
+                config.amplifier.clamp_target(corrected).0,
+                Some((feedback, observed)),
+            );
+            state.robust = asked.robust.with_law_of(&state.robust);
+        }
+    }
     let drive = config.amplifier.drive(&mut state.amplifier, voltage, Limits::NONE);
-    config.estimator.run(&mut state.estimator, drive.applied);
+    let model = config.estimator.run(&mut state.estimator, drive.applied);
+    config.estimate(&mut state.feedback, model);
     match &config.pre_compensator {
         PreCompensator::ProportionalIntegral(it) => it.track(&mut state.pre_compensator, drive.voltage),
         PreCompensator::Robust(it) => it.run(&mut state.robust, drive.applied),
@@ -122,24 +142,48 @@ fn put_out<E: Estimator>(config: &Config<E>, state: &mut State<E::State>, voltag
     drive.voltage
 }
 
-/// Asserts that after `targets` a controller answers as one that has put out the same voltages and was never limited.
-fn forgets<E: Estimator>(config: &Config<E>, targets: &[(f64, u32)], part: f64) -> Result<(), TestCaseError> {
+/// Asserts that after `targets` a controller answers as one that has put out the same voltages and was never limited. `read` returns
+/// the sensor's next reading of a spring under the last voltage.
+fn forgets<E: Estimator>(
+    config: &Config<E>,
+    targets: &[(f64, u32)],
+    part: f64,
+    mut read: impl FnMut(Volts) -> Option<Reading>,
+) -> Result<(), TestCaseError> {
     let (mut limited, mut free) = (State::default(), State::default());
-    let mut acted = Limits::NONE;
+    let (mut acted, mut last) = (Limits::NONE, Volts::ZERO);
     for &(target_v, ticks) in targets {
         for _ in 0..ticks {
-            let output = config.tick(&mut limited, input(target_v));
+            let input = Input { measured: read(last), ..input(target_v) };
+            let output = config.tick(&mut limited, input);
             acted = acted.with(output.limits);
-            prop_assert_eq!(put_out(config, &mut free, output.voltage), output.voltage);
+            last = output.voltage;
+            prop_assert_eq!(put_out(config, &mut free, input, last), last);
         }
     }
     prop_assume!(acted.intersects(Limits::UPPER.with(Limits::LOWER).with(Limits::SLEW)));
     let (lowest, highest) = config.range();
-    let within = input(lowest.to_f64() + part * (highest.to_f64() - lowest.to_f64()));
+    let within = lowest.to_f64() + part * (highest.to_f64() - lowest.to_f64());
     for tick in 0..300 {
-        prop_assert_eq!(config.tick(&mut limited, within), config.tick(&mut free, within), "tick {}", tick);
+        let input = Input { measured: read(last), ..input(within) };
+        let output = config.tick(&mut limited, input);
+        last = output.voltage;
+        prop_assert_eq!(output, config.tick(&mut free, input), "tick {}", tick);
     }
     Ok(())
+}
+
+/// A sensor of a spring with a gain and a time constant of its own: noise of 0.3 V, and no readings for `lost` of 1000.
+#[cfg(feature = "feedback")]
+fn sensor(gain: f64, time_constant_s: f64, rate_hz: f64, lost: u32) -> impl FnMut(Volts) -> Option<Reading> {
+    let (mut relaxed, mut number) = (0.0, 0u32);
+    move |voltage| {
+        number += 1;
+        relaxed += (voltage.to_f64() - relaxed) * -f64::exp_m1(-1.0 / (rate_hz * time_constant_s));
+        let stiffness = gain * (0.1 * voltage.to_f64() + 0.9 * relaxed) + 0.3 * f64::from(number * 7 % 5) - 0.6;
+        let read = Reading { stiffness: ScaledStiffness(Volts::new(stiffness).ok()?.0), age: 0 };
+        (number % 1000 >= lost).then_some(read)
+    }
 }
 
 proptest! {
@@ -155,8 +199,32 @@ proptest! {
         targets in targets(),
         part in 0.01..0.99f64,
     ) {
-        forgets(&config(plain, controller)?, &targets, part)?;
-        spring.with(|plant| forgets(&config(plant, controller)?, &targets, part))?;
+        forgets(&config(plain, controller)?, &targets, part, |_| None)?;
+        spring.with(|plant| forgets(&config(plant, controller)?, &targets, part, |_| None))?;
+    }
+
+    /// The correction is what the same readings make of it, whether the voltage was limited or not.
+    #[test]
+    #[cfg(feature = "feedback")]
+    #[cfg_attr(miri, ignore = "slow under Miri")]
+    fn with_a_sensor_no_controller_remembers_a_limit(
+        plain in plain(),
+        spring in spring(),
+        controller in controller(),
+        targets in targets(),
+        part in 0.01..0.99f64,
+        (gain, time_constant_s, lost) in (0.5..1.5f64, 0.05..50.0f64, prop_oneof![Just(0), 1..400u32]),
+    ) {
+        let (rate_hz, compensation, amplifier) = controller;
+        let (interval_s, oldest_s) = (1.0 / rate_hz, 5.0 / rate_hz);
+        let feedback = Some(Feedback { interval_s, oldest_s, ..Feedback::TYPICAL });
+        let read = || sensor(gain, time_constant_s, rate_hz, lost);
+        let config = validated(&Settings { rate_hz, plant: plain, compensation, amplifier, feedback })?;
+        forgets(&config, &targets, part, read())?;
+        spring.with(|plant| {
+            let config = validated(&Settings { rate_hz, plant, compensation, amplifier, feedback })?;
+            forgets(&config, &targets, part, read())
+        })?;
     }
 
     /// No limit acts in vain: a tick in which one does ends before the target. From the first tick without, the voltage is
