@@ -86,6 +86,29 @@ fn lags_that_imitate_a_loop_are_dropped_with_it() {
     assert!(relaxation.tau_s.len() == 1 && (relaxation.tau_s[0] - 5.5).abs() < 0.02, "{relaxation:?}");
 }
 
+/// A loop of 4 V before one lag, under a stair of 4 V that rises and falls twice. Two oscillations imitate it down to the noise; under the
+/// spring of one lag, it explains the readings better.
+#[test]
+fn a_loop_that_oscillations_imitate_down_to_the_noise_is_named() {
+    let voltage = |row: usize| 4.0 * (row / 60 % 10).min(10 - row / 60 % 10) as f64;
+    let errors = normals();
+    let (mut play, mut lag) = (0.0, 0.0);
+    let row = |row: usize| {
+        let measured = Some(lag + 0.05 * errors[row]);
+        play = f64::clamp(play, voltage(row) - 2.0, voltage(row) + 2.0);
+        lag += (0.5 * voltage(row) + 0.5 * play - lag) * -f64::exp_m1(-1.0 / 20.0);
+        Row { line: row + 2, time_s: row as f64, voltage_v: voltage(row), measured }
+    };
+    let record = Record { name: "stair".into(), rows: (0..ROWS).map(row).collect() };
+    let linear = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+    assert!(linear.plant.modes.len() > 1, "nothing imitates it: {:?}", linear.plant);
+    let (diagnosis, _) = diagnosed(record);
+    let report = &diagnosis.report;
+    let [loop_] = report.findings.as_slice() else { panic!("{report:?}") };
+    assert_eq!((report.verdict, loop_.cause), (Verdict::Explained, "hysteresis"), "{report:?}");
+    assert!(loop_.probability > 0.95 && diagnosis.plant.modes.is_empty(), "{loop_:?}");
+}
+
 /// Rows that were not diagnosed are predicted with zero, gain, curve and lag of those that were.
 #[test]
 fn rows_that_were_not_diagnosed_are_predicted() {

@@ -38,7 +38,7 @@ use crate::record::data::Data;
 use crate::record::held::{Held, held};
 use crate::record::input::Input;
 use crate::record::normalisation::Normalisation;
-use crate::record::observed::Observed;
+use crate::record::observed::{Kind, Observed};
 use crate::search::{Scored, Search, WarmStart};
 use crate::stats::scale::variance;
 use crate::stats::thresholds::empirical::{LARGEST_ERROR_RATIO, LONG_RECORD_ROWS, ROWS_TO_DIAGNOSE, ROWS_TO_SEARCH};
@@ -116,11 +116,30 @@ pub(super) struct Normalised {
 }
 
 impl Normalised {
-    /// True if the causes predict held-out segments clearly better than another nominal spring, whose error is given.
+    /// True if the causes explain the record and predict held-out segments clearly better than another nominal spring, whose error is
+    /// given.
     fn predicts_better_than(&self, error: f64) -> bool {
         // The error of a reading that is known up to an interval is mostly zero, but not in the error that is given.
         let is_comparable = self.found.observed.intervals() == 0;
-        is_comparable && !self.found.report.findings.is_empty() && self.held_out_rmse() < CLEARLY_BETTER * error
+        is_comparable && self.names_causes() && self.explains() && self.held_out_rmse() < CLEARLY_BETTER * error
+    }
+
+    fn names_causes(&self) -> bool {
+        !self.found.report.findings.is_empty()
+    }
+
+    /// True if the causes leave nothing but noise.
+    fn explains(&self) -> bool {
+        matches!(self.found.report.verdict, Verdict::Consistent | Verdict::Explained | Verdict::Ambiguous)
+    }
+
+    /// Score of the extended simulation, in nats, as a density of the readings in their own unit.
+    fn score(&self) -> f64 {
+        let Diagnosis { observed, extended, score, .. } = &self.found;
+        // What is rounded, or known up to an interval, has a probability, whatever the unit.
+        let is_dense = extended.noise.half_step == 0.0;
+        let dense = observed.kinds.iter().filter(|kind| is_dense && **kind == Kind::Exact).count();
+        score - dense as f64 * self.normalisations[0].scales.reading.abs().ln()
     }
 
     /// Root mean square of the held-out error, in the reading's unit.
@@ -128,11 +147,12 @@ impl Normalised {
         self.normalisations[0].scales.reading.abs() * self.found.report.extended.quality.held_out_rmse
     }
 
-    /// Returns this diagnosis under a simpler nominal spring if its causes make it predict held-out segments as well as another one, and
-    /// the other one otherwise; the work of both is counted.
+    /// Returns this diagnosis under a simpler nominal spring if its causes make it predict held-out segments as well as another one, where
+    /// that explains the record, are clearly likelier, too; and the other one otherwise. The work of both is counted.
     fn or(mut self, mut other: Self) -> Self {
-        let is_better =
-            !self.found.report.findings.is_empty() && self.held_out_rmse() < AS_GOOD * other.held_out_rmse();
+        let is_as_good = self.names_causes() && self.held_out_rmse() < AS_GOOD * other.held_out_rmse();
+        let is_likelier = || self.explains() && self.score() > other.score() + CLEARLY_LIKELIER;
+        let is_better = is_as_good && (!other.explains() || is_likelier());
         let (one, two) = (&mut self.found.report, &mut other.found.report);
         let work = one.search.work + two.search.work;
         let allowed = one.search.work + two.search.allowed;
@@ -265,7 +285,7 @@ fn nominal(plant: &str, base: &Base) -> Nominal {
 }
 
 /// Share of the work for the diagnosis under a simpler nominal spring.
-const SHARE_OF_SIMPLER: f64 = 0.6;
+const SHARE_OF_SIMPLER: f64 = 0.35;
 /// Ratio of the held-out errors of a diagnosis under a simpler nominal spring and of the identified one below which no other is needed.
 const CLEARLY_BETTER: f64 = 0.8;
 /// Ratio of the held-out errors up to which a simpler nominal spring is as good as another.

@@ -23,8 +23,8 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
-    /// The best spring of the lowest order that is nearly as good, as a plant file; `None` if what is left is noise, or no lower order is:
-    /// what is not linear makes a model of higher order better, which imitates it.
+    /// The best spring of the lowest order that may lack no more than a cause, as a plant file; `None` if no lower order is: what is not
+    /// linear makes a model of higher order better, which imitates it.
     pub simpler: Option<PlantFile>,
     /// True if the spring was taken to be at rest when each record begins.
     pub settled: bool,

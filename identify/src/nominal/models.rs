@@ -27,8 +27,8 @@ const PRICE_OF_POLE: f64 = 4.0;
 const PRICE_IF_CONFIRMED: f64 = 3.0;
 /// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
 pub(super) const STRUCTURED: f64 = 3.0;
-/// Ratio of the held-out errors up to which a model of lower order is nearly as good as another.
-const NEARLY: f64 = 1.5;
+/// Ratio of the held-out errors up to which a model of lower order may lack a cause that another one imitates.
+const IMITATED: f64 = 5.0;
 /// Part of a record to which a model is fitted that predicts the rest.
 const FIRST_PART: f64 = 0.6;
 /// Steps of a refinement from a fit to similar readings, and the relative reduction of the cost below which it ends.
@@ -121,12 +121,10 @@ impl Models {
         root_mean_square(&self.fits[self.chosen].held_out)
     }
 
-    /// The lowest order whose held-out error is nearly that of the chosen one, if its errors are no noise; `None` if that is the chosen
-    /// order.
+    /// The lowest order that may lack no more than a cause, which the chosen one imitates; `None` if that is the chosen order.
     pub(super) fn simpler(&self) -> Option<usize> {
         let held_out = |order: usize| root_mean_square(&self.fits[order].held_out);
-        let nearly = |order: &usize| held_out(*order) < NEARLY * held_out(self.chosen);
-        (1..self.chosen).find(nearly).filter(|_| is_structured(&self.problem, &self.best_fit().residual))
+        (1..self.chosen).find(|order| held_out(*order) < IMITATED * held_out(self.chosen))
     }
 
     pub(super) fn best_fit(&self) -> &Fit {
