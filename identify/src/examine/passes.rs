@@ -27,6 +27,7 @@ use crate::answer::{Nominal, Report, SearchReport, Verdict};
 use crate::effects::index_of;
 use crate::effects::model::Model;
 use crate::examine::hypothesis::hypothesise;
+use crate::examine::merits::Merits;
 use crate::examine::options::Options;
 use crate::fit::budget::Budget;
 use crate::fit::engine::Engine;
@@ -116,43 +117,24 @@ pub(super) struct Normalised {
 }
 
 impl Normalised {
-    /// True if the causes explain the record and predict held-out segments clearly better than another nominal spring, whose error is
-    /// given.
-    fn predicts_better_than(&self, error: f64) -> bool {
-        // The error of a reading that is known up to an interval is mostly zero, but not in the error that is given.
-        let is_comparable = self.found.observed.intervals() == 0;
-        is_comparable && self.names_causes() && self.explains() && self.held_out_rmse() < CLEARLY_BETTER * error
-    }
-
-    fn names_causes(&self) -> bool {
-        !self.found.report.findings.is_empty()
-    }
-
-    /// True if the causes leave nothing but noise.
-    fn explains(&self) -> bool {
-        matches!(self.found.report.verdict, Verdict::Consistent | Verdict::Explained | Verdict::Ambiguous)
-    }
-
-    /// Score of the extended simulation, in nats, as a density of the readings in their own unit.
-    fn score(&self) -> f64 {
-        let Diagnosis { observed, extended, score, .. } = &self.found;
+    fn merits(&self) -> Merits {
+        let Diagnosis { report, observed, extended, score, .. } = &self.found;
+        let unit = self.normalisations[0].scales.reading.abs();
         // What is rounded, or known up to an interval, has a probability, whatever the unit.
         let is_dense = extended.noise.half_step == 0.0;
         let dense = observed.kinds.iter().filter(|kind| is_dense && **kind == Kind::Exact).count();
-        score - dense as f64 * self.normalisations[0].scales.reading.abs().ln()
+        Merits {
+            names_causes: !report.findings.is_empty(),
+            explains: matches!(report.verdict, Verdict::Consistent | Verdict::Explained | Verdict::Ambiguous),
+            held_out_rmse: unit * report.extended.quality.held_out_rmse,
+            score: score - dense as f64 * unit.ln(),
+            intervals: observed.intervals(),
+        }
     }
 
-    /// Root mean square of the held-out error, in the reading's unit.
-    fn held_out_rmse(&self) -> f64 {
-        self.normalisations[0].scales.reading.abs() * self.found.report.extended.quality.held_out_rmse
-    }
-
-    /// Returns this diagnosis under a simpler nominal spring if its causes make it predict held-out segments as well as another one, where
-    /// that explains the record, are clearly likelier, too; and the other one otherwise. The work of both is counted.
+    /// Returns this diagnosis under a simpler nominal spring or the other one, whichever has more merits; the work of both is counted.
     fn or(mut self, mut other: Self) -> Self {
-        let is_as_good = self.names_causes() && self.held_out_rmse() < AS_GOOD * other.held_out_rmse();
-        let is_likelier = || self.explains() && self.score() > other.score() + CLEARLY_LIKELIER;
-        let is_better = is_as_good && (!other.explains() || is_likelier());
+        let is_better = self.merits().are_preferred_to(&other.merits());
         let (one, two) = (&mut self.found.report, &mut other.found.report);
         let work = one.search.work + two.search.work;
         let allowed = one.search.work + two.search.allowed;
@@ -213,7 +195,7 @@ pub(super) fn diagnose_together(
     };
     let budget = Budget::part(SHARE_OF_SIMPLER, options.effort, rows, options.stop.clone());
     let simple = under(simpler, records, options, only, &budget, progress)?;
-    if options.held_out_rmse.is_some_and(|of_full| simple.predicts_better_than(of_full)) {
+    if options.held_out_rmse.is_some_and(|of_full| simple.merits().need_no_other(of_full)) {
         return Ok(simple);
     }
     let budget = Budget::left(options.effort, rows, budget.spent_of_own(), rows, options.stop.clone());
@@ -286,10 +268,6 @@ fn nominal(plant: &str, base: &Base) -> Nominal {
 
 /// Share of the work for the diagnosis under a simpler nominal spring.
 const SHARE_OF_SIMPLER: f64 = 0.35;
-/// Ratio of the held-out errors of a diagnosis under a simpler nominal spring and of the identified one below which no other is needed.
-const CLEARLY_BETTER: f64 = 0.8;
-/// Ratio of the held-out errors up to which a simpler nominal spring is as good as another.
-const AS_GOOD: f64 = 1.02;
 /// Share of the work that is left for one search, the others for its report and for later passes.
 const SHARE_OF_SEARCH: f64 = 0.87;
 /// Share of the work that is left for the search on a part of the rows of a long record.
