@@ -548,6 +548,18 @@ mod tests {
         assert_eq!(pinned(&both[1..], true), Verdict::Named(StuckSensor));
     }
 
+    /// In variances: the scale of the innovation, the last vector, is taken back.
+    #[test]
+    fn the_energy_without_a_cause_is_what_the_nuisance_leaves() {
+        for last in 2..=5 {
+            let mut decision = Decision { pivot: 1, scales: [1; 8], ..Decision::NEW };
+            decision.scales[usize::from(last)] = 3;
+            decision.matrix[at(last, last)] = 5;
+            decision.divide(last);
+            assert_eq!(decision.none, 5 << 6, "{last} vectors");
+        }
+    }
+
     /// A shift to the left saturates, and one to the right rounds down, however far it goes.
     #[test]
     fn a_shift_goes_either_way() {

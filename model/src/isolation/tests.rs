@@ -208,10 +208,13 @@ fn a_finding_holds_size_interval_and_explained_part() {
 /// A size on which the readings do not depend is no size of 0 that is known exactly: its interval is that of what is possible.
 #[test]
 fn a_size_that_is_not_determined_can_be_any() {
-    let verdict = Verdict::Named(Cause::ChargeLeakage);
-    let report = Report { verdict, since_blocks: 5, energies: (8 << 20, 2 << 20), blocks: 1, ..Report::default() };
-    let Finding { size, half_width, .. } = report.finding(&Settings::PAPER, 1000.0).unwrap();
-    assert_eq!((size, half_width), (0.45, 0.45));
+    // From 0 to 0.9, and from -0.7 to 4.
+    for (cause, middle, half) in [(Cause::ChargeLeakage, 0.45, 0.45), (Cause::GainError, 1.65, 2.35)] {
+        let verdict = Verdict::Named(cause);
+        let report = Report { verdict, since_blocks: 5, energies: (8 << 20, 2 << 20), blocks: 1, ..Report::default() };
+        let Finding { size, half_width, .. } = report.finding(&Settings::PAPER, 1000.0).unwrap();
+        assert!((size - middle).abs() < 1e-12 && (half_width - half).abs() < 1e-12, "{cause:?}: {size} {half_width}");
+    }
 }
 
 #[test]
@@ -372,6 +375,26 @@ fn with_the_sums_the_number_of_their_blocks_is_halved() {
         config(1000.0).close(&mut state);
         let expected = if halve { (120, 5) } else { (240, 10) };
         assert_eq!(((state.blocks, state.doubted), state.held), (expected, 0));
+    }
+}
+
+/// The products of a group are added when it is complete, and before that where the sums are halved or copied.
+#[test]
+fn a_group_is_added_when_it_is_complete_or_its_sums_are_needed() {
+    let config = config(1000.0);
+    let full = products::GROUP - 1;
+    for (held, blocks, since_decision, added) in [
+        (0, 100, 0, false),
+        (full, 100, 0, true),
+        (0, bank::MOST_BLOCKS - 2, 0, false),
+        (0, bank::MOST_BLOCKS - 1, 0, true),
+        (0, 100, bank::ROUND - 2, false),
+        (0, 100, bank::ROUND - 1, true),
+    ] {
+        let mut state = State { held, blocks, since_decision, ..State::at_rest() };
+        state.tests.highest = config.alarm;
+        config.assess(&mut state);
+        assert_eq!(state.next, if added { ADD } else { IDLE }, "{held} {blocks} {since_decision}");
     }
 }
 

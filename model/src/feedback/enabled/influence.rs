@@ -165,6 +165,45 @@ mod tests {
         assert!((5.9..6.0).contains(&quick), "three quarters of what it has moved by, not {quick} V");
     }
 
+    /// One step of a signal more is beyond each bound.
+    #[test]
+    fn at_its_bound_an_innovation_is_no_larger_than_the_noise() {
+        let step = f64::from(Signal::from_bits(1));
+        assert_eq!(of(true, 0.0, [1.5, 1.5])[1].1, 0.0);
+        assert!(of(true, 0.0, [1.5 + step, 1.5 + step])[1].1 > 1.0);
+        let config = Config::new(1e-3, Signal::from_num(NOISE), true);
+        for (moved, is_quick) in [(NOISE, false), (NOISE + step, true)] {
+            // Without the tick in which the envelope already returns.
+            let (mut state, model, recent) = (State::default(), Signal::from_num(moved), Envelope::default());
+            let mut of = || config.of(&mut state, Signal::from_num(20), Signal::ZERO, model, &recent).quick;
+            of();
+            assert_eq!(of() > Signal::ZERO, is_quick, "{moved} V");
+        }
+    }
+
+    /// The lower envelope of the innovations has returned to exactly that by the second one.
+    #[test]
+    fn an_innovation_that_was_behind_by_the_noise_still_has_the_wider_bound() {
+        let config = Config::new(1e-3, Signal::from_num(NOISE), false);
+        let (model, mut recent) = (Signal::from_num(100), Envelope::default());
+        envelope::Config::new(1e-3).track(&mut recent, model);
+        let mut found = 0;
+        for bits in 0..4000 {
+            let mut state = State::default();
+            let mut of = |nu: Signal| config.of(&mut state, nu, Signal::ZERO, model, &recent).clipped;
+            of(Signal::from_bits(bits) - Signal::from_num(6.114));
+            let clipped = of(Signal::from_num(50));
+            let behind = state.innovations.distances(Signal::ZERO).0;
+            if behind == Signal::from_num(NOISE) {
+                assert_eq!(clipped, Signal::from_num(50));
+                found += 1;
+            } else if behind > Signal::from_num(NOISE) {
+                assert_eq!(clipped, Signal::from_num(NOISE));
+            }
+        }
+        assert!(found > 0);
+    }
+
     #[test]
     fn a_correction_for_a_spring_that_was_behind_is_taken_back_without_delay_but_not_beyond_0() {
         assert_eq!(of(true, -4.0, [-20.0, 8.0, 8.0]), [(-6.0, 0.0), (8.0, 0.0), (8.0, 3.0)]);

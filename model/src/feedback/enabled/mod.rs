@@ -189,6 +189,23 @@ mod tests {
         assert!((seen_in(&reduced, Observed::Reading) - (20.0 + 80.0 / 4.0 * feedback.gain())).abs() < 1e-3);
     }
 
+    /// What the sensor has corrected stays, unless the next configuration has no sensor.
+    #[test]
+    fn after_a_transfer_the_gain_is_not_reduced() {
+        let running = State {
+            correction: widened(Signal::from_num(20)),
+            oscillation: oscillation::State::reduced(1),
+            ..State::default()
+        };
+        let after = |config: Option<&Config>| {
+            let mut state = running;
+            state.transfer_to(config);
+            state
+        };
+        assert_eq!(after(Some(&quick())), State { oscillation: oscillation::State::default(), ..running });
+        assert_eq!(after(None), State::default());
+    }
+
     /// A spring that is two and a half deviations of the noise ahead of a model that moves.
     #[test]
     fn a_reading_before_a_time_without_trust_is_not_the_first_of_two() {

@@ -132,3 +132,44 @@ impl<I: Copy> TimeOptimal<I> {
         state.offset = widened(now.saturating_add(distance).saturating_sub(target.0));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coefficient::WideGain;
+    use crate::estimator::{Model, Plant, StepGain};
+
+    fn time() -> SampleTime {
+        SampleTime::from_rate(1000.0).unwrap()
+    }
+
+    #[test]
+    fn an_approach_takes_up_to_a_second() {
+        let checked = |seconds| {
+            let approach = Approach::new(seconds).unwrap();
+            assert!(approach.time_constant_s().to_bits() == seconds.to_bits());
+            approach.validate(time()).map(drop).map_err(|error| error.field)
+        };
+        assert_eq!([0.0, 0.25, 1.0].map(checked), [Ok(()); 3]);
+        assert_eq!([-0.1, 1.1, f64::NAN].map(checked), [Err("approach_s"); 3]);
+    }
+
+    fn law(time_constant_s: f64) -> TimeOptimal<WideGain> {
+        let spring = Invertible::new(Plant::PAPER.validate(time()).unwrap(), 0.17);
+        Approach { time_constant_s }.validate(time()).unwrap().quantize(&spring, None)
+    }
+
+    /// A dead-beat approach covers the whole distance in a tick, and asks for no rounding error again.
+    #[test]
+    fn an_approach_covers_its_part_of_the_distance_in_a_tick() {
+        let StepGain { feedthrough, in_one_tick, .. } = Plant::PAPER.largest_step_gain(time());
+        for (seconds, covered) in
+            [(0.0, 1.0), (-0.0, 1.0), (0.1, 1.0 - (-0.01f64).exp()), (1.0, 1.0 - (-1e-3f64).exp())]
+        {
+            let law = law(seconds);
+            let asked = (1.0 - covered) * feedthrough / (feedthrough + in_one_tick);
+            assert!((law.approach.to_f64() - covered).abs() < 1e-8, "{seconds} s: {:?}", law.approach);
+            assert!((law.rounding.to_f64() - asked).abs() < 1e-8, "{seconds} s: {:?}", law.rounding);
+        }
+    }
+}

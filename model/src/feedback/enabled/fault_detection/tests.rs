@@ -76,6 +76,21 @@ fn at_rest_the_gate_is_six_standard_deviations() {
     }
 }
 
+/// The gate lies about the mismatch that the accepted readings have had, and moves with it and with the model.
+#[test]
+fn the_gate_follows_the_mismatch_of_the_accepted_readings_and_a_jump_of_the_model() {
+    let at = volts(100.0);
+    let mut bench = Bench::trusted(at);
+    let accepts = |bench: &Bench| [-8.0, -4.0, 4.0, 8.0].map(|mismatch| bench.accepts(at + volts(mismatch), at));
+    assert_eq!(accepts(&bench), [false, true, true, false]);
+    for reading in 0..20 {
+        assert!(bench.read(at + volts(4.0) + Signal::from_bits(reading % 2), at).is_some());
+    }
+    assert_eq!(accepts(&bench), [false, false, true, true]);
+    bench.state.shift(volts(-8.0));
+    assert_eq!(accepts(&bench), [true, true, false, false]);
+}
+
 /// The model has just moved by 100 V, which widens the gate to 206 V: what remains is the bound of an abrupt change.
 #[test]
 fn while_the_model_moves_only_abrupt_changes_back_and_forth_are_rejected() {

@@ -89,3 +89,33 @@ fn counters_stay_at_their_ends() {
     config.detect(&mut state, Signal::from_num(200), Signal::from_num(6));
     assert_eq!((state.crossings, state.reductions), (u8::MAX, MAX_REDUCTIONS));
 }
+
+/// The gate at rest is the noise, 6 V, on both sides.
+#[test]
+fn a_mismatch_crosses_beyond_the_gate_and_not_at_it() {
+    let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
+    let (gate, step) = (Signal::from_num(6), Signal::from_bits(1));
+    for (above, mismatch, crossed) in [
+        (false, gate, false),
+        (false, gate + step, true),
+        (true, Signal::ZERO, false),
+        (true, -gate, false),
+        (true, -gate - step, true),
+    ] {
+        let mut state = State { above, ..State::default() };
+        config.detect(&mut state, mismatch, gate);
+        assert_eq!(state.above != above, crossed, "{mismatch} V");
+    }
+}
+
+/// A model that lacks a lag is wrong by what the target has moved.
+#[test]
+fn while_the_target_moves_the_gate_is_wider_by_twice_that() {
+    let config = Config::new(1e-3, SampleTime::from_rate(1000.0).unwrap());
+    for (moved, crossed) in [(0, true), (100, false)] {
+        let mut state = State::default();
+        config.track_target(&mut state, Signal::from_num(moved));
+        config.detect(&mut state, Signal::from_num(200), Signal::from_num(6));
+        assert_eq!(state.above, crossed, "{moved} V");
+    }
+}

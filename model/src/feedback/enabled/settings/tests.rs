@@ -18,6 +18,8 @@ fn the_gain_is_that_of_the_steady_kalman_filter() {
         }
         assert!((feedback.gain() - gain.min(0.499)).abs() < 1e-6, "{} {gain}", feedback.gain());
     }
+    let unbounded = Feedback { fastest_s: 0.0, ..Feedback::TYPICAL };
+    assert_eq!(Feedback { fastest_s: -0.0, ..unbounded }.gain(), unbounded.gain());
     // Bounded by `fastest_s`.
     let bounded = Feedback { noise_v: 0.01, fastest_s: 0.5, ..Feedback::TYPICAL };
     assert!((bounded.gain() - (1.0 - (-0.002f64).exp())).abs() < 1e-12);
@@ -60,6 +62,14 @@ fn each_bound_is_where_it_is_documented() {
     assert_eq!(error(Feedback { interval_s: 0.001, ..good }), Ok(()));
     assert_eq!(error(Feedback { interval_s: 0.1, ..good }), Ok(()));
     assert_eq!(error(Feedback { interval_s: 0.000_99, ..good }), Err("interval_s"));
+}
+
+#[test]
+fn values_are_in_the_order_of_the_fields() {
+    let values = [0.5, 2.0, 0.2, 0.002, 0.02, -10.0, 500.0, 3.0];
+    let feedback = Feedback::from_values(values).unwrap();
+    assert_eq!(feedback.values(), values);
+    assert_eq!((feedback.noise_v, feedback.oldest_s, feedback.fade_s), (0.5, 0.02, 3.0));
 }
 
 #[test]
