@@ -280,6 +280,21 @@ fn the_output_of_the_loop_is_that_of_the_spring_times_the_gain() {
     assert!(of_loop.stiffness.0 > Signal::ZERO && output.stiffness.0 == twice(of_loop.stiffness.0));
 }
 
+/// The controller's own spring and the bank's may differ: each is multiplied.
+#[test]
+fn controller_and_bank_run_the_spring_with_these_parameters() {
+    let parameters = Parameters { time_constant: 1.25, share: 0.75, gain: 1.1 };
+    let of_bank = Plant { share: 0.125, time_constant_s: 4.0 };
+    let (control, bank) = (control(Compensation::None), isolation::Settings { plant: of_bank, ..bank() });
+    let built = Variant::new(&control, &bank, &parameters).unwrap();
+    let time = crate::SampleTime::from_rate(control.rate_hz).unwrap();
+    let plant = Plant { share: 0.75 / 11.0, time_constant_s: 1.25 * 5.5 };
+    assert_eq!(built.control, controller::Settings { plant, ..control }.validate().unwrap().quantize());
+    let plant = Plant { share: 0.75 * 0.125, time_constant_s: 5.0 };
+    assert_eq!(built.bank, isolation::Settings { plant, ..bank }.validate(time).unwrap().quantize());
+    assert_eq!(built.scale, Scale::new(1.1));
+}
+
 #[test]
 fn phases_have_the_names_of_the_log() {
     let names = ["watching", "moving", "settling", "trial", "frozen", "returning", "stopped", "off"];

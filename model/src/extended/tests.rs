@@ -184,6 +184,20 @@ fn a_spring_that_cannot_be_inverted_is_rejected_by_name() {
     assert_eq!(error(ExtendedPlant { memory, ..PLAIN }), Err("memory.direct"));
 }
 
+#[test]
+fn a_setting_of_any_block_out_of_range_is_rejected_by_name() {
+    let error = |plant: ExtendedPlant<'_>| plant.validate(sample_time()).err().map(|error| error.field);
+    let memory = Some(Memory { direct: f64::NAN, thresholds_v: &[10.0], weights: &[0.5] });
+    let law = Some(Law { voltage_v: &[0.0, 100.0], stiffness: &[0.0, f64::NAN] });
+    let leakage = Some(Leakage { share: f64::NAN, time_constant_s: 1.0 });
+    let relaxation = Relaxation { share: f64::NAN, ..LAGS };
+    assert_eq!(error(PLAIN), None);
+    assert_eq!(error(ExtendedPlant { memory, ..PLAIN }), Some("memory.direct"));
+    assert_eq!(error(ExtendedPlant { law, ..PLAIN }), Some("law.stiffness"));
+    assert_eq!(error(ExtendedPlant { leakage, ..PLAIN }), Some("leakage.share"));
+    assert_eq!(error(ExtendedPlant { relaxation, ..PLAIN }), Some("relaxation.share"));
+}
+
 /// A spring is plain only if no block extends it.
 #[test]
 fn the_plain_spring_has_one_constant_time_constant_and_its_whole_weight() {

@@ -255,6 +255,22 @@ mod tests {
         assert_eq!(state.lead_before, lead >> 1);
     }
 
+    /// After a transfer there is no step yet; the correction asks for 50 V of stiffness more.
+    #[cfg(feature = "feedback")]
+    #[test]
+    fn with_a_trusted_sensor_the_voltage_rises_slowly_without_a_step_too() {
+        let (law, volts) = (law(0.0, 0.02), |volts: f64| Volts::new(volts).unwrap());
+        let config =
+            feedback::Feedback::TYPICAL.validate(SampleTime::from_rate(1000.0).unwrap()).unwrap().quantize(true);
+        let (last, target) = (volts(100.0), volts(100.0).0);
+        let mut state = State { target, trusted: true, ..State::default() };
+        let aim = Aim { target: volts(100.0), pursued: volts(150.0), model: target, driven: last, applied: last };
+        let correction = Some((&config, &feedback::State::default(), Observed::Reading));
+        let voltage = law.voltage(&mut state, aim, correction);
+        assert_eq!(state.step, Signal::ZERO);
+        assert_eq!(voltage.0, last.0 + law.rise);
+    }
+
     #[test]
     fn the_lead_is_that_of_the_quick_spring_and_of_its_gain() {
         let (law, volts) = (law(0.1, 0.02), |volts: i32| Signal::from_num(volts));

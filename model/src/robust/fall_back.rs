@@ -277,13 +277,13 @@ mod tests {
     #[test]
     fn nothing_falls_back_before_the_lead_has_passed_its_largest_at_the_target() {
         assert_eq!(falls(100.0, 0.0, &[30.0, 40.0, 45.0, 45.0], 400.0).0, [0.0; 4]);
-        // A 64th below the largest.
-        assert_eq!(falls(100.0, 0.0, &[48.0, 47.3, 47.2], 400.0).0, [0.0, 0.0, 25.0]);
+        // More than a 64th below the largest.
+        assert_eq!(falls(100.0, 0.0, &[48.0, 47.3, 47.25, 47.2], 400.0).0, [0.0, 0.0, 0.0, 25.0]);
         let mut phase = Phase::Before(volts(80.0));
         let mut fall = |missing: f64| {
             thresholds().fall(&mut phase, volts(100.0), (Signal::ZERO, volts(40.0)), volts(missing), volts(400.0))
         };
-        assert_eq!((fall(3.2), fall(3.1)), (Signal::ZERO, volts(25.0)));
+        assert_eq!((fall(3.2), fall(3.125)), (Signal::ZERO, volts(25.0)));
     }
 
     #[test]
@@ -340,6 +340,26 @@ mod tests {
         let thresholds = Thresholds::new(&design, &quick, &amplifier, SampleTime::from_rate(1000.0).unwrap());
         assert_eq!((thresholds.longest_ticks, thresholds.largest_jump), (3000, volts(300.0)));
         assert_eq!(thresholds.range, (volts(0.0), volts(1000.0)));
+    }
+
+    #[test]
+    fn just_after_a_step_a_spring_is_behind_by_what_its_share_lacks() {
+        let spring = Kernel::new((0.1, 0.95), (0.08, 1.05));
+        assert_eq!(spring.behind(-1e-9), 0.0);
+        assert!((spring.behind(0.0) - 0.2).abs() < 1e-12, "{}", spring.behind(0.0));
+    }
+
+    /// In the last hundredth of the times that are tried it could as well be one that no time brings into the band.
+    #[test]
+    fn the_design_has_no_late_fall_back_and_no_return_that_no_weight_can_hold() {
+        let designed = |[time_constant, share, gain, fall_back]: [f64; 4], quick_share| {
+            let margin = Margin { time_constant, share, gain, overshoot: 0.02, fall_back };
+            FallBack::design(&margin, quick_share).is_some()
+        };
+        // The ends are 3.94 and 3.98 time constants.
+        assert_eq!([0.0172, 0.01747].map(|gain| designed([0.25, 0.1, gain, 0.05], 0.1)), [true, false]);
+        // The returns are 9.99 V per V of the step, 10 and 20.
+        assert_eq!([0.05005, 0.05, 0.025].map(|quick| designed([0.07, 0.02, 0.0, 0.5], quick)), [true, false, false]);
     }
 
     /// Shares of 1/11; the numbers are those of the equations in the module's text, computed by another program.

@@ -79,6 +79,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_setting_out_of_range_is_rejected_by_name() {
+        let time = SampleTime::from_rate(1000.0).unwrap();
+        let good = Margin { time_constant: 0.25, share: 0.25, gain: 0.25, overshoot: 0.2, fall_back: 0.5 };
+        assert_eq!(good.check(time), Ok(()));
+        for (margin, field) in [
+            (Margin { time_constant: 0.26, ..good }, "margin.time_constant"),
+            (Margin { share: -0.01, ..good }, "margin.share"),
+            (Margin { gain: f64::NAN, ..good }, "margin.gain"),
+            (Margin { overshoot: 0.21, ..good }, "margin.overshoot"),
+            (Margin { fall_back: 0.51, ..good }, "margin.fall_back"),
+        ] {
+            assert_eq!(margin.check(time).unwrap_err().field, field);
+        }
+    }
+
+    #[test]
     fn values_are_in_the_order_of_the_fields() {
         let values = [0.1, 0.05, 0.01, 0.02, 0.25];
         let margin = Margin::from_values(values).unwrap();

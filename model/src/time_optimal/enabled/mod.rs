@@ -159,6 +159,17 @@ mod tests {
         Approach { time_constant_s }.validate(time()).unwrap().quantize(&spring, None)
     }
 
+    #[test]
+    fn an_offset_decays_with_a_tenth_of_a_second() {
+        let (law, spring) = (law(0.0), Plant::PAPER.validate(time()).unwrap().quantize());
+        let mut state = State { offset: Accumulator::from_num(100) };
+        for _ in 0..100 {
+            law.voltage(&mut state, Volts::ZERO, &spring, &Default::default(), Volts::ZERO, Volts::ZERO);
+        }
+        let expected = 100.0 * (-1f64).exp();
+        assert!((state.offset.to_num::<f64>() - expected).abs() < 1e-3, "{}", state.offset);
+    }
+
     /// A dead-beat approach covers the whole distance in a tick, and asks for no rounding error again.
     #[test]
     fn an_approach_covers_its_part_of_the_distance_in_a_tick() {
