@@ -368,6 +368,17 @@ fn the_ticks_between_the_parts_of_the_work_are_free() {
 }
 
 #[test]
+fn the_sums_are_closed_in_the_tick_after_the_last_of_their_steps() {
+    let config = config(1000.0);
+    for (step, held, next) in [(CLOSE - 1, products::GROUP, CLOSE), (CLOSE, 0, IDLE)] {
+        let mut state = State { held: products::GROUP, ..State::at_rest() };
+        state.means.usable = true;
+        config.work(&mut state, step);
+        assert_eq!((state.held, state.next), (held, next));
+    }
+}
+
+#[test]
 fn with_the_sums_the_number_of_their_blocks_is_halved() {
     for halve in [false, true] {
         let mut state = State { blocks: 240, doubted: 10, held: 8, ..State::at_rest() };
