@@ -498,9 +498,12 @@ mod tests {
             }
             decision.unbounded = unbounded;
             decision.best = left.iter().min_by_key(|(_, left)| left).unwrap().0 as u8;
-            while !decision.idle() {
+            // Each cause twice, and three more.
+            for step in 0..2 * CAUSES + 3 {
+                assert!(!decision.idle(), "after {step} steps");
                 decision.step(&config, &copy, released);
             }
+            assert!(decision.idle());
         }
         decision.verdict
     }
