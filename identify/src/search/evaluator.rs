@@ -1,6 +1,7 @@
 //! What a search asks about structures. An [`Engine`] answers from a record, a test from a table.
 
 use std::borrow::Cow;
+use std::cmp::Ordering;
 use std::collections::HashSet;
 
 use crate::adequacy;
@@ -196,7 +197,7 @@ impl Evaluator for Engine<'_> {
                 .retain(|it| it.predicted_gain > GAIN_PER_PRICE.get() * (Evaluator::price(self, &it.block) + misfit));
         }
         let start = |Extension { block, point, .. }| Start { price: Evaluator::price(self, &block), block, point };
-        let starts = extensions.into_iter().map(start).collect();
+        let starts = best_of_each_first(extensions).into_iter().map(start).collect();
         first_fits(self, fit, &law, starts)
     }
 
@@ -288,8 +289,9 @@ impl Evaluator for Engine<'_> {
     }
 
     fn go_on(&mut self, best: &Fit) -> bool {
-        root_mean_square(&best.residual) < PART_LEFT * root_mean_square(&self.baseline_residual)
-            && self.budget().go_on()
+        // Beyond a bound of the sensor a residual is no error.
+        let [left, before] = [&best.residual, &self.baseline_residual].map(|residual| self.observed.rms(residual));
+        !best.model.blocks.is_empty() && left < PART_LEFT * before && self.budget().go_on()
     }
 
     fn work_left(&self) -> u64 {
@@ -360,17 +362,27 @@ fn extensions(
 /// The rare forms that are worth fitting, those with the largest predicted gains first: the best of each effect, then others as long as
 /// there is room.
 fn rare(mut found: Vec<Extension>) -> Vec<Extension> {
-    let by_gain = |a: &Extension, b: &Extension| b.predicted_gain.total_cmp(&a.predicted_gain);
-    found.sort_by(by_gain);
-    let best = found.first().map_or(0.0, |it| it.predicted_gain);
+    let best = found.iter().map(|it| it.predicted_gain).fold(0.0, f64::max);
     // Before any is left out for want of room: what promises next to nothing needs none.
     found.retain(|it| it.predicted_gain > PART_OF_BEST * best);
-    let mut seen = HashSet::new();
-    let (mut kept, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|it| seen.insert(it.block.effect));
-    kept.extend(others);
+    let mut kept = best_of_each_first(found);
     kept.truncate(RARE_FORMS_FITTED);
     kept.sort_by(by_gain);
     kept
+}
+
+/// The best of each effect, then the others, both in the order of their predicted gains.
+fn best_of_each_first(mut found: Vec<Extension>) -> Vec<Extension> {
+    found.sort_by(by_gain);
+    let mut seen = HashSet::new();
+    let (mut first, others): (Vec<_>, Vec<_>) = found.into_iter().partition(|it| seen.insert(it.block.effect));
+    first.extend(others);
+    first
+}
+
+/// The larger predicted gain first.
+fn by_gain(a: &Extension, b: &Extension) -> Ordering {
+    b.predicted_gain.total_cmp(&a.predicted_gain)
 }
 
 /// True if a form would gain many times its price.
