@@ -70,6 +70,10 @@ Examples:
     /// Panic, hard fault, stack overflow, the same with floats in use, stalled task, hanging control, the same with
     /// interrupts off, overrun, interlock, overrun and interlock together, silent host, missing guards. Exits with 1
     /// unless the voltage goes away on the DAC's wire and the log is the approved one.
+    #[command(after_help = "\
+Examples:
+  cargo xtask drill
+  cargo xtask drill --only silence                     one of them")]
     Drill(drill::Args),
     /// Let a host talk to the emulated firmware
     ///
@@ -126,6 +130,7 @@ Examples:
   cargo xtask boot --controller fast --limit-v 1000    the same for an amplifier of 1000 V
   cargo xtask boot --controller robust                 for a spring known to within errors
   cargo xtask boot --brief --controller fast           only what the controller or the amplifier may change
+  cargo xtask boot --only 'late tick'                  one run
   cargo xtask boot --all                               every image, one after the other")]
     Boot(boot::Args),
     /// Build the C library's example, run it here and under QEMU

@@ -44,6 +44,8 @@ const SECTIONS: [(&str, &[Source]); 7] = [
             Command("mutants-model", "cargo xtask mutants --package model"),
             Command("mutants-link", "cargo xtask mutants --package link"),
             Command("mutants-firmware", "cargo xtask mutants --package firmware"),
+            Command("sabotage", "cargo xtask sabotage"),
+            Command("sabotage-host", "cargo xtask sabotage --host"),
         ],
     ),
     (

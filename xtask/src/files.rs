@@ -38,3 +38,18 @@ pub fn tracked(paths: &[&str]) -> Result<Vec<String>> {
     let is_there = |file: &&str| !file.is_empty() && shell::root().join(file).is_file();
     Ok(files.split('\0').filter(is_there).map(str::to_owned).collect())
 }
+
+/// Copies every file that git tracks, as it is now, to `folder`; what was built there before stays.
+pub fn copy_tracked(folder: &Path) -> Result<()> {
+    for file in tracked(&[])? {
+        let to = folder.join(&file);
+        make(to.parent().context("a file in a folder")?)?;
+        let from = shell::root().join(&file);
+        let bytes = fs::read(&from).with_context(|| format!("cannot read {}", from.display()))?;
+        // Unchanged files keep their time, so that cargo does not compile them again.
+        if fs::read(&to).ok().as_ref() != Some(&bytes) {
+            write(&to, bytes)?;
+        }
+    }
+    Ok(())
+}

@@ -19,6 +19,7 @@ mod package;
 mod page;
 mod prove;
 mod reproducible;
+mod sabotage;
 mod sanitize;
 mod sbom;
 mod steps;
@@ -168,6 +169,20 @@ Examples:
   cargo xtask mutants --package model --iterate        only what the last run has not caught"
     )]
     Mutants(mutants::Args),
+    /// Break each promise on purpose; demand that its test fails
+    ///
+    /// As .cargo/sabotages.toml says, in a copy of the sources: each change must
+    /// make the test, drill or boot run fail that stands beside the promise in
+    /// docs/promises.md. Takes an hour; the copy stays in target/sabotage.
+    #[command(
+        verbatim_doc_comment,
+        after_help = "\
+Examples:
+  cargo xtask sabotage
+  cargo xtask sabotage --host                          no drills, no boot runs
+  cargo xtask sabotage --only supervisor --only drill"
+    )]
+    Sabotage(sabotage::Args),
     /// Run the tests of the MCU's code under Miri and the address sanitizer
     ///
     /// Overflow checks are on in both. Installs a nightly toolchain with Miri unless it is there.
@@ -277,7 +292,9 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
     use Command::{
         Bench, Boot, Capi, Check, Clients, Counts, Deny, Dist, Drill, Emulate, Flash, Fuzz, Image, Mutants, Page, Proof,
     };
-    use Command::{Manual, Prove, Python, Reproducible, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times};
+    use Command::{
+        Manual, Prove, Python, Reproducible, Sabotage, Sanitize, Setup, Size, Soak, Story, Talk, Test, Times,
+    };
     match command {
         Setup => setup::run(),
         Check => check::run(),
@@ -294,6 +311,7 @@ fn run(command: Command, args: &[OsString]) -> Result<()> {
         Dist => dist::run(),
         Times(args) => times::run(&args),
         Mutants(args) => mutants::run(&args),
+        Sabotage(args) => sabotage::run(&args),
         Sanitize(args) => sanitize::run(&args),
         Deny { require_advisories } => deny::run(require_advisories),
         Reproducible(variant) => reproducible::run(variant),

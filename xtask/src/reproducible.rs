@@ -1,9 +1,6 @@
 //! `cargo xtask reproducible`: builds the images in two folders with names of different lengths, and compares the files.
 
-use std::fs;
-use std::path::Path;
-
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use xtask::build::{self, Board};
 use xtask::files;
 use xtask::segments;
@@ -18,7 +15,7 @@ const FOLDERS: [&str; 2] = ["a", "another-folder-whose-name-is-longer"];
 pub(crate) fn run(variant: Variant) -> Result<()> {
     let target = shell::target_directory()?.join("reproducible");
     let copies = FOLDERS.map(|name| target.join(name));
-    copies.iter().try_for_each(|folder| copy_sources(folder))?;
+    copies.iter().try_for_each(|folder| files::copy_tracked(folder))?;
     let mut counts = Vec::new();
     for board in Board::ALL {
         let [one, other] = [&copies[0], &copies[1]].map(|root| build::image_of_copy(root, &variant.features(), board));
@@ -40,18 +37,4 @@ pub(crate) fn run(variant: Variant) -> Result<()> {
 fn first(one: &[u8], other: &[u8]) -> String {
     let at = one.iter().zip(other).take_while(|(one, other)| one == other).count();
     format!("from byte {at} on ({} and {} bytes)", one.len(), other.len())
-}
-
-/// Copies every file that git tracks, as it is now, to `folder`; what was built there before stays.
-fn copy_sources(folder: &Path) -> Result<()> {
-    for file in files::tracked(&[])? {
-        let to = folder.join(&file);
-        files::make(to.parent().context("a file in a folder")?)?;
-        let bytes = build::read(&shell::root().join(&file))?;
-        // Unchanged files keep their time, so that cargo does not compile them again.
-        if fs::read(&to).ok().as_ref() != Some(&bytes) {
-            files::write(&to, bytes)?;
-        }
-    }
-    Ok(())
 }

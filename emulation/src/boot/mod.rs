@@ -12,7 +12,7 @@ mod schedule;
 
 use std::fs;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use link::Block;
 use model::Settings;
 use serde::Deserialize;
@@ -24,6 +24,7 @@ use xtask::{python, segments, shell};
 
 use crate::binary::{audit, elf, size};
 use crate::variant;
+use checks::Check;
 use events::Events;
 use schedule::{RANDOM, Replacement, page};
 
@@ -43,17 +44,28 @@ pub(crate) struct Args {
     /// Only the runs in which controller or amplifier matter
     #[arg(long)]
     brief: bool,
+    /// Only the run of this name
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["all", "brief"])]
+    only: Vec<String>,
 }
 
 /// Runs the image of a variant, or those of all.
 pub(crate) fn run(args: &Args) -> Result<()> {
     if args.all {
         let every = |operations: usize| (0..operations).collect();
-        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, every, false).map(drop));
+        return Variant::ALL.into_iter().try_for_each(|variant| one(variant, every, |_| true).map(drop));
     }
+    let [settings, model] = Replacement::both(args.variant)?;
+    let known = checks::of(&[], args.variant, (&settings, &[]), (&model, &[]));
+    if let Some(unknown) = args.only.iter().find(|name| !known.iter().any(|it| it.run == *name)) {
+        bail!("there is no run `{unknown}`");
+    }
+    let is_wanted = |check: &Check<'_>| {
+        (check.is_of_variant || !args.brief) && (args.only.is_empty() || args.only.iter().any(|name| name == check.run))
+    };
     let some = |operations: usize| vec![0, operations / 2, operations - 2, operations - 1];
-    let faults = one(args.variant, some, args.brief)?;
-    if args.brief {
+    let faults = one(args.variant, some, is_wanted)?;
+    if args.brief || !args.only.is_empty() {
         return Ok(());
     }
     let faults = ("faults injected in the image that is flashed, on register models".to_owned(), faults as u64);
@@ -61,9 +73,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Builds the image, runs it once for each case, and prints what each run showed. `cuts` chooses, of a number of operations of the flash,
-/// those in which the chip is reset; a `brief` verification has only the runs in which controller or amplifier matter. Returns the number
-/// of injected faults.
-fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, brief: bool) -> Result<usize> {
+/// those in which the chip is reset; only the runs that are wanted take place. Returns the number of injected faults.
+fn one(
+    variant: Variant,
+    cuts: impl Fn(usize) -> Vec<usize>,
+    is_wanted: impl Fn(&Check<'_>) -> bool,
+) -> Result<usize> {
     let Settings { amplifier, .. } = variant::settings(variant);
     println!(
         "image of the {} controller, {} to {} V",
@@ -98,9 +113,9 @@ fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, brief: bool) -> Res
     let [settings, model] = &replaced;
     let mut checks = checks::of(&bytes, variant, (settings, &settings_cuts), (model, &model_cuts));
     let all = checks.len();
-    checks.retain(|check| !brief || check.is_of_variant);
-    if brief {
-        println!("brief: {} of {all} runs", checks.len());
+    checks.retain(is_wanted);
+    if checks.len() < all {
+        println!("{} of {all} runs", checks.len());
     }
     let names: Vec<&str> = checks.iter().map(|check| check.run).collect();
     let case = elf.with_extension("boot.json");
@@ -132,7 +147,9 @@ fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, brief: bool) -> Res
     fs::write(&case, case_of.to_string()).with_context(|| format!("cannot write {}", case.display()))?;
     let output = shell::json(shell::command(python).args(["-B", "emulation/models/boot.py"]).arg(&bin).arg(&case))?;
 
-    println!("stack: {}", runs::stack(&output, size.worst_stack())?);
+    if let Some(depth) = runs::stack(&output, size.worst_stack())? {
+        println!("stack: {depth}");
+    }
     for check in &checks {
         let events = Events::deserialize(&output[check.run]).with_context(|| format!("no run `{}`", check.run))?;
         println!("{}: {}", check.run, (check.shows)(&events).context(check.run)?);

@@ -259,21 +259,24 @@ pub(super) fn instructions(events: &Events, variant: Variant) -> Result<String> 
 }
 
 /// The greatest depth of the stack in any of the runs, which must not exceed the `worst` one that is computed, and the
-/// name of that run.
-pub(super) fn stack(output: &serde_json::Value, worst: u32) -> Result<String> {
+/// name of that run. `None` if each of them has a RAM that fails its test.
+pub(super) fn stack(output: &serde_json::Value, worst: u32) -> Result<Option<String>> {
     let depth = |(name, value): (&String, &serde_json::Value)| {
         let events = Events::deserialize(value).ok()?;
         events.0.iter().rfind(|event| event.1 == "stack").and_then(|event| Some((event.2.as_u64()?, name.clone())))
     };
     // A RAM that fails its test is left full of patterns.
     let sound = |(name, _): &(&String, &serde_json::Value)| !["stuck bit", "coupled bits"].contains(&name.as_str());
-    let runs = output.as_object().context("no runs")?.iter().filter(sound);
+    let mut runs = output.as_object().context("no runs")?.iter().filter(sound).peekable();
+    if runs.peek().is_none() {
+        return Ok(None);
+    }
     let (deepest, name) = runs.filter_map(depth).max().context("no depth of the stack")?;
     ensure!(
         deepest <= u64::from(worst),
         "{deepest} bytes of stack in the run `{name}`, and {worst} were computed as the most"
     );
-    Ok(format!("at most {deepest} bytes in any run (`{name}`); {worst} are computed as the most"))
+    Ok(Some(format!("at most {deepest} bytes in any run (`{name}`); {worst} are computed as the most")))
 }
 
 /// A start with a RAM that fails its test: nothing starts, the log says so, and the watchdog resets the chip into the
