@@ -13,6 +13,9 @@ use xtask::shell;
 /// default ones. The others are tested as parts of the workspace, so that what they share is compiled once.
 const ALONE: [(&str, &str); 3] = [("vsj-model", ""), ("vsj-link", ""), ("firmware", "fast,robust,adaptation")];
 
+/// What they are compiled with, as by `cargo xtask mutants`: a change takes a third of the time.
+const PROFILE: &str = "mutants";
+
 /// One piece of evidence.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Evidence {
@@ -89,7 +92,7 @@ impl Program {
             _ => bail!("{file} belongs to no program of tests"),
         };
         let mut arguments = match alone {
-            Some(features) => vec!["-p", package, "--features", features],
+            Some(features) => vec!["--profile", PROFILE, "-p", package, "--features", features],
             None if target == ["--lib"] => vec!["-p", package],
             None => vec!["--workspace", "--exclude=vsj-python"],
         };
@@ -117,9 +120,17 @@ mod tests {
     #[test]
     fn a_file_leads_to_its_program_and_modules() {
         for (file, arguments, modules) in [
-            ("model/src/supervisor/tests/states.rs", "-p vsj-model --features  --lib", "supervisor::tests::states::"),
-            ("model/tests/controller.rs", "-p vsj-model --features  --test controller", ""),
-            ("firmware/src/store/mod.rs", "-p firmware --features fast,robust,adaptation --lib", "store::"),
+            (
+                "model/src/supervisor/tests/states.rs",
+                "--profile mutants -p vsj-model --features  --lib",
+                "supervisor::tests::states::",
+            ),
+            ("model/tests/controller.rs", "--profile mutants -p vsj-model --features  --test controller", ""),
+            (
+                "firmware/src/store/mod.rs",
+                "--profile mutants -p firmware --features fast,robust,adaptation --lib",
+                "store::",
+            ),
             ("host-sim/tests/link/command.rs", "--workspace --exclude=vsj-python --test link", "command::"),
             ("link-host/src/client.rs", "-p link-host --lib", "client::"),
             ("emulation/src/soak/mod.rs", "--workspace --exclude=vsj-python --bin emulation", "soak::"),

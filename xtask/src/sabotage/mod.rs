@@ -112,18 +112,24 @@ impl Copy {
     /// Runs all the evidence on the copy as it is. An error if one fails; else the names of its tests.
     fn passes(&self, evidence: &BTreeSet<&Evidence>) -> Result<Names> {
         let mut programs: BTreeMap<Vec<String>, Vec<(&Evidence, &str, String)>> = BTreeMap::new();
-        let mut names = Names::new();
+        let (mut drills, mut runs) = (Vec::new(), Vec::new());
         for one in evidence {
             match one {
                 Evidence::Test(file, name) => {
                     let Program { arguments, modules } = Program::of(file)?;
                     programs.entry(arguments).or_default().push((one, name, modules));
                 }
-                Evidence::Drill(_) | Evidence::Boot(_) => {
-                    ensure!(!self.is_noticed(one, &names)?, "{one} fails");
-                }
+                Evidence::Drill(name) => drills.push(name.as_str()),
+                Evidence::Boot(name) => runs.push(name.as_str()),
             }
         }
+        for (command, names) in [("drill", drills), ("boot", runs)] {
+            if !names.is_empty() {
+                let output = self.emulate(command, &names)?;
+                ensure!(output.status.success(), "{command} fails:\n{}", end(&output));
+            }
+        }
+        let mut names = Names::new();
         for (arguments, tests) in programs {
             let output = self.test(&arguments, tests.iter().map(|(_, name, _)| *name))?;
             for (one, name, modules) in tests {
@@ -140,8 +146,8 @@ impl Copy {
                 let name = names.get(evidence).context("no such test")?;
                 fails(&self.test(&Program::of(file)?.arguments, ["--exact", name])?)
             }
-            Evidence::Drill(name) => self.emulate("drill", name, &format!("error: drill {name}: ")),
-            Evidence::Boot(name) => self.emulate("boot", name, &format!("error: {name}: ")),
+            Evidence::Drill(name) => fails_with(&self.emulate("drill", &[name])?, &format!("error: drill {name}: ")),
+            Evidence::Boot(name) => fails_with(&self.emulate("boot", &[name])?, &format!("error: {name}: ")),
         }
     }
 
@@ -157,21 +163,14 @@ impl Copy {
         Ok(text)
     }
 
-    /// Whether a drill or boot run fails, which it says in a line that begins with `says`.
-    fn emulate(&self, command: &str, name: &str, says: &str) -> Result<bool> {
+    /// Runs the drills or boot runs of these names and returns what they print.
+    fn emulate(&self, command: &str, names: &[&str]) -> Result<Output> {
         let mut build = self.cargo();
         build.args(["build", "--quiet", "--workspace", "--exclude=vsj-python", "--bin=emulation"]);
         let built = output(&mut build)?;
         ensure!(built.status.success(), "it does not compile:\n{}", end(&built));
         let mut program = self.command(self.build.join("debug/emulation"));
-        let output = output(program.args([command, "--only", name]))?;
-        if output.status.success() {
-            return Ok(false);
-        }
-        if !String::from_utf8_lossy(&output.stderr).lines().any(|line| line.starts_with(says)) {
-            bail!("it fails otherwise:\n{}", end(&output));
-        }
-        Ok(true)
+        output(program.arg(command).args(names.iter().flat_map(|name| ["--only", *name])))
     }
 
     fn cargo(&self) -> Command {
@@ -182,6 +181,9 @@ impl Copy {
     fn command(&self, program: impl AsRef<OsStr>) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.tree).env("CARGO_TARGET_DIR", &self.build);
+        // Small packages are compiled incrementally, by their profile; for the others it takes much of the disk.
+        command.env_remove("CARGO_INCREMENTAL").env("CARGO_PROFILE_DEV_INCREMENTAL", "false");
+        command.env("CARGO_PROFILE_MUTANTS_OPT_LEVEL", "1");
         command
     }
 }
@@ -209,6 +211,16 @@ fn passed(output: &str, modules: &str, name: &str) -> Result<String> {
         [(test, "ok")] => Ok((*test).to_owned()),
         _ => bail!("{found:?} instead of one test that passes"),
     }
+}
+
+/// Whether a drill or boot run has failed, which it says in a line that begins with `says`.
+fn fails_with(output: &Output, says: &str) -> Result<bool> {
+    if output.status.success() {
+        return Ok(false);
+    }
+    let said = String::from_utf8_lossy(&output.stderr).lines().any(|line| line.starts_with(says));
+    ensure!(said, "it fails otherwise:\n{}", end(output));
+    Ok(true)
 }
 
 /// Whether the only test that a program has run has failed.
