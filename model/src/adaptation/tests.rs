@@ -362,21 +362,23 @@ fn no_other_cause_and_no_weak_evidence_changes_anything() {
 fn what_is_not_confirmed_is_undone() {
     let named = |cause| {
         move |state: &State| {
-            let wrong = if state.phase() == Phase::Trial { Verdict::Named(cause) } else { TAU };
-            seen(wrong, 0.125)
+            let wrong = matches!(state.phase(), Phase::Trial | Phase::Frozen);
+            seen(if wrong { Verdict::Named(cause) } else { TAU }, 0.125)
         }
     };
     for cause in [Cause::ReadingOffset, Cause::Drift, Cause::SensorSaturation, Cause::StuckSensor, Cause::TimeConstant]
     {
         let mut state = State::default();
-        let mut farthest = 0.0;
+        let (mut farthest, mut tried) = (0.0, 0);
         let says = named(cause);
         follow(&mut state, |state| {
             farthest = f64::max(farthest, state.parameters().time_constant);
+            tried += u32::from(matches!(state.phase(), Phase::Trial | Phase::Frozen));
             says(state)
         });
         assert_eq!((state.parameters(), state.phase()), (Parameters::STORED, Phase::Stopped), "{cause:?}");
         assert!(farthest > 1.1, "{cause:?}");
+        assert!(tried <= 2, "{cause:?}: the first verdict ends the trial, not its longest time: {tried} blocks");
         state.switch(true);
         assert_eq!(state.phase(), Phase::Watching);
     }
