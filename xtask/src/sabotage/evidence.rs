@@ -13,8 +13,8 @@ use xtask::shell;
 /// default ones. The others are tested as parts of the workspace, so that what they share is compiled once.
 const ALONE: [(&str, &str); 3] = [("vsj-model", ""), ("vsj-link", ""), ("firmware", "fast,robust,adaptation")];
 
-/// What they are compiled with, as by `cargo xtask mutants`: a change takes a third of the time.
-const PROFILE: &str = "mutants";
+/// What all of them are compiled with, as by `cargo xtask mutants`: what has not changed is not compiled again.
+pub(super) const PROFILE: &str = "mutants";
 
 /// One piece of evidence.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -92,11 +92,11 @@ impl Program {
             _ => bail!("{file} belongs to no program of tests"),
         };
         let mut arguments = match alone {
-            Some(features) => vec!["--profile", PROFILE, "-p", package, "--features", features],
+            Some(features) => vec!["-p", package, "--features", features],
             None if target == ["--lib"] => vec!["-p", package],
             None => vec!["--workspace", "--exclude=vsj-python"],
         };
-        arguments.extend(target);
+        arguments.extend(["--profile", PROFILE].iter().chain(&target));
         let modules = modules.iter().filter(|name| !["mod", "lib", "main"].contains(name));
         Ok(Self {
             arguments: arguments.into_iter().map(str::to_owned).collect(),
@@ -122,18 +122,26 @@ mod tests {
         for (file, arguments, modules) in [
             (
                 "model/src/supervisor/tests/states.rs",
-                "--profile mutants -p vsj-model --features  --lib",
+                "-p vsj-model --features  --profile mutants --lib",
                 "supervisor::tests::states::",
             ),
-            ("model/tests/controller.rs", "--profile mutants -p vsj-model --features  --test controller", ""),
+            ("model/tests/controller.rs", "-p vsj-model --features  --profile mutants --test controller", ""),
             (
                 "firmware/src/store/mod.rs",
-                "--profile mutants -p firmware --features fast,robust,adaptation --lib",
+                "-p firmware --features fast,robust,adaptation --profile mutants --lib",
                 "store::",
             ),
-            ("host-sim/tests/link/command.rs", "--workspace --exclude=vsj-python --test link", "command::"),
-            ("link-host/src/client.rs", "-p link-host --lib", "client::"),
-            ("emulation/src/soak/mod.rs", "--workspace --exclude=vsj-python --bin emulation", "soak::"),
+            (
+                "host-sim/tests/link/command.rs",
+                "--workspace --exclude=vsj-python --profile mutants --test link",
+                "command::",
+            ),
+            ("link-host/src/client.rs", "-p link-host --profile mutants --lib", "client::"),
+            (
+                "emulation/src/soak/mod.rs",
+                "--workspace --exclude=vsj-python --profile mutants --bin emulation",
+                "soak::",
+            ),
         ] {
             let program = Program::of(file).unwrap();
             assert_eq!(

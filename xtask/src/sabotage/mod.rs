@@ -18,7 +18,7 @@ use anyhow::{Context, Result, bail, ensure};
 use xtask::tally::Tally;
 use xtask::{files, shell};
 
-use evidence::{Evidence, Program};
+use evidence::{Evidence, PROFILE, Program};
 use list::{FILE, List, Sabotage};
 
 /// Arguments of `cargo xtask sabotage`.
@@ -166,10 +166,18 @@ impl Copy {
     /// Runs the drills or boot runs of these names and returns what they print.
     fn emulate(&self, command: &str, names: &[&str]) -> Result<Output> {
         let mut build = self.cargo();
-        build.args(["build", "--quiet", "--workspace", "--exclude=vsj-python", "--bin=emulation"]);
+        build.args([
+            "build",
+            "--quiet",
+            "--workspace",
+            "--exclude=vsj-python",
+            "--profile",
+            PROFILE,
+            "--bin=emulation",
+        ]);
         let built = output(&mut build)?;
         ensure!(built.status.success(), "it does not compile:\n{}", end(&built));
-        let mut program = self.command(self.build.join("debug/emulation"));
+        let mut program = self.command(self.build.join(PROFILE).join("emulation"));
         output(program.arg(command).args(names.iter().flat_map(|name| ["--only", *name])))
     }
 
@@ -181,9 +189,8 @@ impl Copy {
     fn command(&self, program: impl AsRef<OsStr>) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.tree).env("CARGO_TARGET_DIR", &self.build);
-        // Small packages are compiled incrementally, by their profile; for the others it takes much of the disk.
-        command.env_remove("CARGO_INCREMENTAL").env("CARGO_PROFILE_DEV_INCREMENTAL", "false");
-        command.env("CARGO_PROFILE_MUTANTS_OPT_LEVEL", "1");
+        // As the profile says.
+        command.env_remove("CARGO_INCREMENTAL").env("CARGO_PROFILE_MUTANTS_OPT_LEVEL", "1");
         command
     }
 }
