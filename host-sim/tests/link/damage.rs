@@ -2,7 +2,7 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use host_sim::link::{Client, Patience, Port};
 use link::nonce::Nonces;
@@ -94,7 +94,9 @@ fn ten_thousand_damaged_frames_over_a_socket_apply_nothing_that_was_not_sent() {
     // The first valid frame is accepted.
     stream.write_all(frame(20_000, Request::Disarm).as_bytes()).unwrap();
     let disarm = Command { heard: true, arming: Some(supervisor::Command::Disarm), target: None };
+    let sent = Instant::now();
     while mcu.with(|shared| shared.ordered.last() != Some(&disarm)) {
+        assert!(sent.elapsed() < Duration::from_secs(60), "the first valid frame is not accepted");
         std::thread::sleep(Duration::from_millis(1));
     }
     stream.shutdown(std::net::Shutdown::Both).unwrap();
