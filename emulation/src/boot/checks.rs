@@ -67,7 +67,7 @@ pub(super) fn of<'a>(
         stopped("panic", KILL_US, "panic at injected.rs:7"),
         stopped("hard fault", KILL_US, "name=hard-fault"),
         stopped("two wrong bits", KILL_US, "name=hard-fault"),
-        stopped("stack overflow", KILL_US, "name=hard-fault"),
+        check("stack overflow", move |it| runs::overflowed(it, image)),
         stopped("hang", hang_us + KILL_US, "name=watchdog").of_variant(),
         stopped("stopped timer", hang_us + KILL_US, "name=watchdog"),
         check("late tick", |it| host::late(it, SUPERVISION.missed_ticks_allowed)),

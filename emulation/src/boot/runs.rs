@@ -83,6 +83,17 @@ pub(super) fn stopped(events: &Events, image: &[u8], within_us: f64, line: &str)
     Ok(format!("DAC zero and enable off {gone} later, before anything is logged; `{boot}`"))
 }
 
+/// A run in which the stack overflows: it is [`stopped`] by the guard, before an access leaves the memory, which is a fault as well.
+pub(super) fn overflowed(events: &Events, image: &[u8]) -> Result<String> {
+    let fault = events.0.iter().find(|event| event.1 == "fault").context("no fault")?;
+    ensure!(
+        fault.2.as_str().is_some_and(|why| why.contains("the MPU guards")),
+        "a fault without the guard: {}",
+        fault.2
+    );
+    stopped(events, image, KILL_US, "name=hard-fault")
+}
+
 /// A run with a `fault` that the supervisor detects, of the monitors by this `mismatch`: the output is
 /// zero and disabled within `within_us`, the ticks go on without voltage whatever the host sends, and the fault is
 /// reported on the line, after at most so many `frames`, again and again, because this host does not say that it has heard of it.

@@ -53,7 +53,7 @@ pub(in crate::boot) fn flood(events: &Events, variant: Variant) -> Result<String
 /// Most ticks between two samples in the flood: the longest answers are on the line meanwhile.
 const MOST_TICKS: u64 = 3 * EVERY_TICKS as u64;
 
-/// A run in which one tick takes longer than the five that are tolerated: they are counted, and the voltage stays.
+/// A run in which one tick takes so long that the five that are tolerated are missed: they are counted, the voltage stays, and the grid too.
 pub(in crate::boot) fn late(events: &Events, missed: u32) -> Result<String> {
     let (_, ticking) = events.split("watchdog started")?;
     let (before, after) = events.split("injected")?;
@@ -61,6 +61,10 @@ pub(in crate::boot) fn late(events: &Events, missed: u32) -> Result<String> {
     let longest = dac.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     let missed_us = f64::from(missed) * PERIOD_US;
     ensure!((missed_us..missed_us + 3.0 * PERIOD_US).contains(&longest), "the longest pause was {longest:.0} us");
+    // But for the late tick and the one that follows it immediately.
+    let off_grid = |us: &f64| (us - dac[0] - ((us - dac[0]) / PERIOD_US).round() * PERIOD_US).abs();
+    let shifted = dac.iter().skip(3).map(off_grid).fold(0.0, f64::max);
+    ensure!(dac.len() > 50 && shifted < JITTER_US, "{} ticks, then up to {shifted:.2} us off their grid", dac.len());
     ensure!(after.0.iter().filter(|event| event.1 == "dac").all(|event| event.2 != 0), "the voltage does not stay");
     ensure!(!after.0.iter().any(|event| event.2 == "off") && after.times("reset").is_empty(), "it is switched off");
     let last = answers(&ticking)?.into_iter().rev().find_map(|(.., reply)| match reply {
@@ -69,7 +73,8 @@ pub(in crate::boot) fn late(events: &Events, missed: u32) -> Result<String> {
     });
     ensure!(last == Some((missed, Fault::NONE)), "{last:?} instead of {missed} missed ticks and no fault");
     Ok(format!(
-        "{missed} missed ticks are counted in the status and tolerated, the longest pause was {:.1} ms",
+        "{missed} missed ticks are counted in the status and tolerated, the longest pause was {:.1} ms, and the next ticks are at most \
+         {shifted:.2} us off the grid before",
         longest / 1e3
     ))
 }
