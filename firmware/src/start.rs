@@ -402,7 +402,7 @@ mod tests {
         let robust_is_there = model::Margin::from_values([0.05; 5]).is_some();
         assert_eq!(check(fast), contains(fast_is_there, "controller"));
         assert_eq!(check(robust), contains(robust_is_there, "controller"));
-        // In every build: without a margin, which an image without this controller never has, there is none to run.
+        // In every build: an image without this controller reads no margin, and without one nothing could run.
         assert_eq!(check(WireSettings { margin: None, ..robust }), contains(false, "controller"));
         if robust_is_there {
             let wide = check(WireSettings { margin: Some([0.05, 0.3, 0.0, 0.02, 0.0]), ..robust });

@@ -125,7 +125,7 @@ mod tests {
         for evidence in &named {
             match (sabotaged.contains(evidence), list.without.contains_key(evidence)) {
                 (false, false) => wrong.push(format!("{evidence}: neither sabotage nor reason")),
-                (true, true) => wrong.push(format!("{evidence}: a sabotage and a reason why there is none")),
+                (true, true) => wrong.push(format!("{evidence}: a sabotage, and a reason for the lack of one")),
                 _ => {}
             }
         }
