@@ -74,11 +74,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Builds the image, runs it once for each case, and prints what each run showed. `cuts` chooses, of a number of operations of the flash,
 /// those in which the chip is reset; only the runs that are wanted take place. Returns the number of injected faults.
-fn one(
-    variant: Variant,
-    cuts: impl Fn(usize) -> Vec<usize>,
-    is_wanted: impl Fn(&Check<'_>) -> bool,
-) -> Result<usize> {
+fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, is_wanted: impl Fn(&Check<'_>) -> bool) -> Result<usize> {
     let Settings { amplifier, .. } = variant::settings(variant);
     println!(
         "image of the {} controller, {} to {} V",
