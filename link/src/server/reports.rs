@@ -110,9 +110,15 @@ mod tests {
         }
     }
 
+    /// The reports that are sent at tick `now`: one more than there are faults if they never end, which fails a test that would otherwise
+    /// not end.
+    fn all_due(reports: &mut Reports, now: u64) -> Vec<FaultReport> {
+        core::iter::from_fn(|| reports.due(now, 5)).take(FAULTS + 1).collect()
+    }
+
     /// Number and fault of each report that is sent at tick `now`.
     fn sent(reports: &mut Reports, now: u64) -> Vec<(u32, u8)> {
-        core::iter::from_fn(|| reports.due(now, 5)).map(|report| (report.number, report.fault.0)).collect()
+        all_due(reports, now).into_iter().map(|report| (report.number, report.fault.0)).collect()
     }
 
     #[test]
@@ -165,7 +171,7 @@ mod tests {
         first.sample.mismatch = crate::Mismatch(3);
         reports.see(&first);
         reports.see(&view(9, &[Fault::Monitor, Fault::Supply]));
-        let sent: Vec<_> = core::iter::from_fn(|| reports.due(9, 5)).collect();
+        let sent = all_due(&mut reports, 9);
         let expected = |number, tick, fault: Fault, mismatch| FaultReport {
             number,
             tick,

@@ -315,10 +315,12 @@ fn a_later_fault_does_not_replace_a_report_that_nobody_has_heard() {
             let first = server.fault(&view).map(reply);
             assert!(matches!(first, Some(Reply::Fault(report)) if report.standing == standing.bits()), "{first:?}");
         }
-        // Once each in a later tick, and no more: the loop of the task that sends them ends.
+        // Once each in a later tick, and no more: the loop of the task that sends them ends. One more than there are faults is taken, so
+        // that reports without an end fail the test.
         let mut repeated = std::vec::Vec::new();
         let later = at(view.sample.tick + 100, view);
-        while let Some(bytes) = server.fault(&later) {
+        for _ in 0..=Cause::ALL.len() {
+            let Some(bytes) = server.fault(&later) else { break };
             let Reply::Fault(report) = reply(bytes) else { panic!() };
             repeated.push((report.number, report.tick, report.fault.0));
         }
