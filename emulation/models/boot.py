@@ -317,9 +317,9 @@ if __name__ == "__main__":
         "stopped timer": lambda: play(HOST, timeless, 400_000),
         "halted": lambda: play(HOST, halted, 500_000),
         "flood": lambda: play(HOSTS["flood"], opened, 440_000),
-        "sent": lambda: play(HOSTS["sent"], None, HOSTS["sent"][-1][0] + 100_000),
+        "sent": lambda: play(HOSTS["sent"], None, answered(HOSTS["sent"])),
         "cut settings": lambda: play(SETTINGS_HOST, None, answered(SETTINGS_HOST), before=cut(STORE[0], SETTINGS, CUTS["settings"])),
         "cut model": lambda: play(MODEL_HOST, None, answered(MODEL_HOST), before=cut(STORE[2], MODEL, CUTS["model"])),
-        "protected page": lambda: play(HOSTS["protected"], None, HOSTS["protected"][-1][0] + 100_000, before=protected),
+        "protected page": lambda: play(HOSTS["protected"], None, answered(HOSTS["protected"]), before=protected),
     }
     print(json.dumps({name: RUNS[name]() for name in CASE["runs"]}))
