@@ -224,6 +224,10 @@ class Board:
 
         self.uc.hook_add(UC_HOOK_MEM_WRITE, write, begin=at, end=at + 3)
 
+    def commanded(self):
+        """The voltage that the amplifier is commanded to put out, in V."""
+        return self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
+
     def depth(self, end, start):
         """Bytes from the top of the stack, `start`, to its lowest word above `end` that is not zero."""
         words = struct.unpack(f"<{(start - end) // 4}I", self.uc.mem_read(end, start - end))
@@ -454,8 +458,7 @@ class Board:
             # Channel 1 measures the amplifier's voltage, channel 2 no current, channel 18 the internal reference if
             # ADC12_CCR.VREFEN is set; `monitors` overrides them with a code, or with a function that returns one.
             channel = self.regs.get(ADC1 + 0x30, 0) >> 6 & 0x1F
-            volts = self.regs.get(DAC1 + 0x08, 0) * self.full_scale / 4095
-            voltage = min(round(volts * 4096 / MONITOR_SCALE), 4095)
+            voltage = min(round(self.commanded() * 4096 / MONITOR_SCALE), 4095)
             # DAC and ADC share their supply, so that an error of it cancels out; the current's zero is ignored.
             reference = round(VREFINT / self.supply * 4096) if self.regs.get(ADC1 + 0x308, 0) & 1 << 22 else 0
             reading = self.monitors.get(channel, {1: voltage, 18: reference}.get(channel, 2048))

@@ -8,6 +8,7 @@ the operation of the flash that is cut. `runs` names the runs that are wanted.
 """
 
 import json
+import math
 import struct
 import sys
 
@@ -100,9 +101,16 @@ def bridged(board):
 
 
 def slow_amplifier(board):
-    """The amplifier begins again from 0 V and rises by 1000 V/s."""
-    begin = board.now
-    board.monitors[1] = lambda: round((board.now - begin) / HZ * 1000 * 4096 / MONITOR_SCALE)
+    """The amplifier begins again from 0 V and approaches its command with a time constant of 0.1 s."""
+    at, volts = board.now, 0.0
+
+    def reading():
+        nonlocal at, volts
+        volts += (board.commanded() - volts) * -math.expm1(-(board.now - at) / HZ / 0.1)
+        at = board.now
+        return round(volts * 4096 / MONITOR_SCALE)
+
+    board.monitors[1] = reading
 
 
 def arcing(board):
