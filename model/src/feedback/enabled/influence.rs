@@ -155,8 +155,8 @@ mod tests {
         let quick = |innovations| of(true, 0.0, innovations).map(|(_, quick)| quick);
         // Three quarters of the smaller one.
         assert_eq!(quick([20.0, 16.0, -1.0, 16.0]), [0.0, 12.0, 0.0, 0.0]);
-        // Their mean exceeds 0.75 V with the fourth.
-        assert_eq!(quick([1.25, 1.25, 1.25, 1.25]), [0.0, 0.0, 0.0, 0.75 * 1.25 * (1.0 - 0.75f64.powi(4))]);
+        // Their mean, 1.25 (1 - 0.75^4), exceeds 0.75 V with the fourth.
+        assert_eq!(quick([1.25, 1.25, 1.25, 1.25]), [0.0, 0.0, 0.0, 0.75 * 1.25 * (1.0 - 81.0 / 256.0)]);
         assert_eq!(quick([-5.0, -5.0, -5.0, -5.0]), [0.0; 4], "behind");
         assert_eq!(quick([-20.0, 8.0, 8.0, 8.0]), [0.0; 4], "behind recently");
         let quick_after = |moved| after(moved, true, 0.0, [20.0, 20.0])[1].1;
