@@ -266,7 +266,20 @@ impl<'a> Simulator<'a> {
 
     /// Returns the change of the prediction at each row by an initial state, in V, of the model that was simulated last.
     fn change(&mut self, model: &Model, chain: &Chain, start: &mut InitialState) -> Vec<f64> {
+        let output = self.data.scales().output;
         let linear = chain.is_linear_in_start();
+        let alone = model.blocks.iter().all(|(block, _)| block.affects() != Affects::Response);
+        let mut again = start.clone();
+        if linear
+            && alone
+            && let Some((mut response, work)) =
+                chain.free_response(&self.amplified.value, &self.data.time_s, &mut again)
+        {
+            *start = again;
+            self.work += work;
+            response.iter_mut().for_each(|stiffness| *stiffness *= output);
+            return response;
+        }
         if linear {
             chain.initial_state_response(&self.amplified.value, &mut self.signal, start, &self.levels_v);
             self.work += (1.0 + IRREGULAR * self.irregular) * INITIAL_STATE * self.signal.len() as f64;
@@ -280,7 +293,6 @@ impl<'a> Simulator<'a> {
             block.effect().modify_response(block.form, point, &mut self.signal, start);
             self.work += response_work(*block, &self.signal, self.irregular);
         }
-        let output = self.data.scales().output;
         let changed = self.signal.at_rows().map(|stiffness| output * stiffness);
         if linear { changed.collect() } else { changed.zip(&self.response.value).map(|(to, from)| to - from).collect() }
     }

@@ -19,7 +19,7 @@ use crate::plant::law::Law;
 use crate::plant::leakage::{InstantaneousLoss, Loss};
 use crate::plant::load_friction::LoadFriction;
 use crate::plant::play_bank::PlayBank;
-use crate::plant::relaxation::Relaxation;
+use crate::plant::relaxation::{Relaxation, Running};
 use crate::plant::restoring;
 use crate::plant::visited::{Range, Visited};
 use crate::record::scales::REFERENCE_VOLTAGE_V;
@@ -71,11 +71,23 @@ pub struct Chain<'a> {
     pub series_s: Vec<f64>,
 }
 
+/// What is left from the time before the first row, beside the offsets of lags.
+struct FromBefore {
+    /// Voltage on the amplifier's output, in V.
+    output_v: f64,
+    /// Voltages that arrive delayed, in V, each for an interval of the delay.
+    late_v: [f64; DELAY_INTERVALS],
+    /// Part by which play operators are where the largest voltage leaves them, 0 to 1.
+    kept: f64,
+}
+
 /// Fraction by which a delay is shortened, so that a jump that falls on the time of a row is before that row however
 /// sums of times are rounded.
 const DELAY_ROUNDING: f64 = 1e-5;
 /// Number of intervals of the delay in which the voltage sent before the first row may have had different values.
 const DELAY_INTERVALS: usize = 6;
+/// No voltage that arrives late.
+const NONE_LATE: [f64; DELAY_INTERVALS] = [0.0; DELAY_INTERVALS];
 /// A voltage above that of any record, in normalised V.
 const HIGHEST_V: f64 = 2000.0 * REFERENCE_VOLTAGE_V;
 
@@ -332,16 +344,66 @@ impl<'a> Chain<'a> {
         self.follow(signal, start, levels_v, None);
     }
 
+    /// Returns the same at the times of the rows, in s, and its work in units of one lag: a linear relaxation responds freely once the
+    /// voltages have arrived that were sent before the first row. `None` where more than these and the relaxation is off.
+    pub fn free_response(&self, applied: &Signal, time_s: &[f64], start: &mut InitialState) -> Option<(Vec<f64>, f64)> {
+        let relaxation = self.exact_series().filter(Relaxation::is_linear)?;
+        if self.output_tau_s > 0.0 || !self.losses.is_empty() || !self.force.is_identity() {
+            return None;
+        }
+        let FromBefore { late_v, kept, .. } = self.from_before(start);
+        if kept != 0.0 {
+            return None;
+        }
+        let mut running = Running::at(&relaxation, 0.0, start);
+        let mut response = Vec::with_capacity(time_s.len());
+        let (mut at_s, mut simulated) = (0.0, 0);
+        if late_v != NONE_LATE {
+            for (piece, starts_row) in applied.pieces_and_rows() {
+                if starts_row && self.have_arrived(at_s) {
+                    break;
+                }
+                let sent = self.late(&late_v, at_s, piece);
+                let (from, _) = running.pass(Piece { from: sent, to: sent, ..piece }, None);
+                at_s += piece.duration_s;
+                simulated += 1;
+                if starts_row {
+                    response.push(from);
+                }
+            }
+        }
+        let arrived = response.len();
+        response.resize(time_s.len(), 0.0);
+        simulated += running.add_free(&time_s[arrived..], &mut response[arrived..]);
+        Some((response, relaxation.free_work(simulated)))
+    }
+
+    /// Returns what is left from the time before the first row.
+    fn from_before(&self, start: &mut InitialState) -> FromBefore {
+        let mut next_if = |is_there: bool| if is_there { start.next_offset_v() } else { 0.0 };
+        FromBefore {
+            output_v: next_if(self.output_tau_s > 0.0),
+            late_v: NONE_LATE.map(|_| next_if(self.delay_s > 0.0)),
+            kept: next_if(self.memory.table().is_some()),
+        }
+    }
+
+    /// Returns the voltage that arrives over a piece which begins at a time, in s, of those that were sent before the first row.
+    fn late(&self, late_v: &[f64; DELAY_INTERVALS], at_s: f64, piece: Piece) -> f64 {
+        let interval = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
+        late_v.get(interval as usize).copied().unwrap_or(0.0)
+    }
+
+    /// Returns true if all voltages have arrived at a time, in s, that were sent before the first row.
+    fn have_arrived(&self, at_s: f64) -> bool {
+        at_s > 2.0 * self.delay_s
+    }
+
     /// Adds to the settled stiffness what is left from the time before the first row: voltages that arrive delayed, and play operators
     /// as the largest voltage leaves them.
     fn add_from_before(&self, applied: &Signal, signal: &mut Signal, start: &mut InitialState) {
-        let mut output = Lag::at(self.output_tau_s, if self.output_tau_s > 0.0 { start.next_offset_v() } else { 0.0 });
-        let late = if self.delay_s > 0.0 {
-            [0.0; DELAY_INTERVALS].map(|_| start.next_offset_v())
-        } else {
-            [0.0; DELAY_INTERVALS]
-        };
-        let kept = if self.memory.table().is_some() { start.next_offset_v() } else { 0.0 };
+        let FromBefore { output_v, late_v, kept } = self.from_before(start);
+        let mut output = Lag::at(self.output_tau_s, output_v);
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
         rest.at(applied.before);
         above.at(HIGHEST_V);
@@ -349,20 +411,92 @@ impl<'a> Chain<'a> {
             0.0 => 0.0,
             _ => kept * (self.law.at(above.at(voltage)) - self.law.at(rest.at(voltage))),
         };
-        if output.value() != 0.0 || kept != 0.0 || late != [0.0; DELAY_INTERVALS] {
+        if output_v != 0.0 || kept != 0.0 || late_v != NONE_LATE {
             let (mut at_s, mut voltages) = (0.0, applied.pieces().iter());
             signal.pass(|piece| {
-                let part = (at_s + piece.duration_s / 2.0) / self.delay_s * DELAY_INTERVALS as f64;
+                let sent = self.late(&late_v, at_s, piece);
                 at_s += piece.duration_s;
-                if kept == 0.0 && output.value() == 0.0 && at_s > 2.0 * self.delay_s {
+                if kept == 0.0 && output.value() == 0.0 && self.have_arrived(at_s) {
                     return (piece.from, piece.to);
                 }
-                let sent = late.get(part as usize).copied().unwrap_or(0.0);
                 let silent = Piece { from: 0.0, to: 0.0, ..piece };
                 let (from, to) = if output.value() == 0.0 { (0.0, 0.0) } else { output.pass(silent) };
                 let voltage = voltages.next().expect("as many pieces");
                 (piece.from + from + sent + apart(voltage.from), piece.to + to + sent + apart(voltage.to))
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::base::Base;
+    use crate::plant::relaxation::Part;
+    use crate::record::data::Data;
+    use crate::record::input::Input;
+    use simulation::plant_file::Mode;
+    use simulation::record::{Record, Row};
+
+    /// Rows at irregular times, a few of them within the delay.
+    fn data() -> Data {
+        let time_s = |row: usize| 0.1 * row as f64 + 0.03 * (row % 3) as f64;
+        let row = |row: usize| Row {
+            line: row,
+            time_s: time_s(row),
+            voltage_v: [300.0, 100.0][row / 7 % 2],
+            measured: Some(row as f64),
+        };
+        Data::new(&Record { name: String::new(), rows: (0..400).map(row).collect() }, Input::Hold)
+    }
+
+    /// Compares free responses with simulations of all pieces; returns the states whose response was free.
+    fn free_states(of: impl Fn(&mut Chain)) -> Vec<usize> {
+        let (data, base) = (data(), Base::paper());
+        let mut chain = base.chain();
+        of(&mut chain);
+        let mut applied = data.command.clone();
+        chain.amplify(&mut applied);
+        let mut free = Vec::new();
+        let (mut state, mut states) = (0, 1);
+        while state < states {
+            let (mut whole, mut start) = (Signal::default(), InitialState::off(state));
+            chain.initial_state_response(&applied, &mut whole, &mut start, &[]);
+            states = start.states();
+            let mut start = InitialState::off(state);
+            if let Some((response, _)) = chain.free_response(&applied, &data.time_s, &mut start) {
+                assert_eq!((response.len(), start.states()), (data.time_s.len(), states));
+                for (row, (free, whole)) in response.iter().zip(whole.at_rows()).enumerate() {
+                    assert!((free - whole).abs() < 1e-9, "state {state}, row {row}: {free} instead of {whole}");
+                }
+                free.push(state);
+            }
+            state += 1;
+        }
+        free
+    }
+
+    #[test]
+    fn a_linear_relaxation_responds_freely_to_what_is_left_from_before() {
+        assert_eq!(free_states(|_| ()), [0]);
+        let several = |chain: &mut Chain| {
+            chain.delay_s = 0.53;
+            chain.relaxation.add_lags(&[Part { part: 0.2, tau_s: 0.4 }], false);
+            chain.relaxation.modes[0] = Mode { freq_hz: 0.7, zeta: 0.1, weight: 0.3, rate_weight: 0.1 };
+        };
+        // Six intervals of the delay, two lags, place and rate of an oscillation.
+        assert_eq!(free_states(several), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!(free_states(|chain| chain.series_s.push(0.8)), [0, 1]);
+        // Play operators keep what is left in all of the record.
+        let with_play = |chain: &mut Chain| chain.memory = PlayBank::new(0.5, [(40.0, 0.5)]);
+        assert_eq!(free_states(with_play), [1]);
+    }
+
+    #[test]
+    fn what_is_off_in_front_of_the_relaxation_is_simulated() {
+        assert!(free_states(|chain| chain.output_tau_s = 0.3).is_empty());
+        let loss = Loss { share: 0.2, tau_s: 3.0, instantaneous: 0.0 };
+        assert!(free_states(|chain| chain.losses.push(loss)).is_empty());
+        assert!(free_states(|chain| chain.relaxation.falling_tau_s = Some(3.0)).is_empty());
     }
 }

@@ -8,19 +8,26 @@
 //! the first one ended. Held-out
 //! segments use the same estimate. The likelihood is reduced by the cost of the states, by Schwarz's criterion.
 
+use std::borrow::Cow;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::stats::scale::robust_scale;
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::HUBER_THRESHOLD;
 
-/// Number of reweighting rounds.
+/// Largest number of reweighting rounds, and the change of an offset, in scales of the residual, below which no other is needed.
 const ROUNDS: usize = 4;
+const SETTLED: f64 = 1e-5;
+/// Largest number of rows from which the scale of the residual is estimated, by which its weights are set.
+const ROWS_OF_SCALE: usize = 500;
 /// Rows in which all kernels are below this fraction of their maximum do not contribute to the estimate.
 const NEGLIGIBLE: f64 = 0.05;
+/// Fraction of its maximum below which a kernel changes nothing in an estimate.
+const VANISHED: f64 = 1e-4;
 
 /// The initial offsets of a chain's states, requested one after the other.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct InitialState {
     asked: usize,
     /// Offsets by the index of their state, in V; 0 beyond.
@@ -78,36 +85,10 @@ impl Estimate {
         reach_v: f64,
         counts: impl Fn(usize) -> bool,
     ) -> Option<Self> {
-        let early = kernels.iter().map(|kernel| decay_end(kernel)).max().unwrap_or(0);
-        let rows: Vec<usize> = (0..early).filter(|&row| counts(row)).collect();
-        let counted = |values: &[f64]| rows.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-        let read = counted(residual);
-        let used: Vec<Vec<f64>> = kernels.iter().map(|kernel| counted(kernel)).collect();
-        let mut weighted = used.clone();
-        let mut start = DVector::zeros(kernels.len());
-        let mut left = read.clone();
-        let (mut usual, mut far) = (robust_scale(&left), f64::INFINITY);
-        for round in 1.. {
-            let prior = (usual / reach_v).powi(2);
-            let mut normal = DMatrix::from_diagonal_element(kernels.len(), kernels.len(), prior);
-            for (i, kernel) in used.iter().enumerate() {
-                let weights = left.iter().map(|left| (far / left.abs()).min(1.0));
-                weighted[i].iter_mut().zip(kernel).zip(weights).for_each(|((to, kernel), of)| *to = of * kernel);
-                start[i] = dot(&weighted[i], &read);
-                // The Cholesky decomposition reads the lower triangle only.
-                used[..=i].iter().enumerate().for_each(|(j, other)| normal[(i, j)] += dot(&weighted[i], other));
-            }
-            let normal = normal.cholesky()?;
-            normal.solve_mut(&mut start);
-            if round == ROUNDS {
-                return Some(Self { start_v: start.as_slice().to_vec(), rows, weighted, normal });
-            }
-            left.clone_from(&read);
-            subtract(start.as_slice(), &used, &mut left);
-            usual = robust_scale(&left);
-            far = HUBER_THRESHOLD.get() * usual;
-        }
-        None
+        let used = Used::of(residual, kernels, counts);
+        let Solution { start_v, weights, normal } = used.solved(reach_v)?;
+        let weighted = |kernel: &Cow<[f64]>| kernel.iter().zip(&weights).map(|(kernel, of)| of * kernel).collect();
+        Some(Self { start_v, weighted: used.kernels.iter().map(weighted).collect(), rows: used.rows, normal })
     }
 
     /// Subtracts from a change of the residual what the initial state takes over of it, its weights unchanged.
@@ -143,6 +124,85 @@ pub(crate) struct Start {
     pub(crate) linear: bool,
 }
 
+/// What an estimate of the initial state uses.
+struct Used<'a> {
+    rows: Vec<usize>,
+    /// Residual in these rows, in V.
+    residual: Cow<'a, [f64]>,
+    /// Kernels in these rows, each up to the row where it has vanished.
+    kernels: Vec<Cow<'a, [f64]>>,
+}
+
+/// Offsets, in V, with the weight of each row and the factorised normal matrix of the last round.
+struct Solution {
+    start_v: Vec<f64>,
+    weights: Vec<f64>,
+    normal: Cholesky<f64, Dyn>,
+}
+
+impl<'a> Used<'a> {
+    fn of(residual: &'a [f64], kernels: &'a [Vec<f64>], counts: impl Fn(usize) -> bool) -> Self {
+        let ends: Vec<Ends> = kernels.iter().map(|kernel| Ends::of(kernel)).collect();
+        let early = ends.iter().map(|ends| ends.negligible).max().unwrap_or(0);
+        let rows: Vec<usize> = (0..early).filter(|&row| counts(row)).collect();
+        let counted = |values: &'a [f64], end: usize| -> Cow<'a, [f64]> {
+            let used = &rows[..rows.partition_point(|row| *row < end)];
+            match rows.len() == early {
+                true => Cow::Borrowed(&values[..used.len()]),
+                false => used.iter().map(|&row| values[row]).collect(),
+            }
+        };
+        let residual = counted(residual, early);
+        let kernels = kernels.iter().zip(&ends).map(|(kernel, ends)| counted(kernel, ends.vanished)).collect();
+        Self { rows, residual, kernels }
+    }
+
+    /// Solves the least squares of Huber's weights, with a prior of standard deviation `reach_v`, in V.
+    fn solved(&self, reach_v: f64) -> Option<Solution> {
+        let states = self.kernels.len();
+        let mut unweighted = DMatrix::zeros(states, states);
+        for (i, kernel) in self.kernels.iter().enumerate() {
+            // The Cholesky decomposition reads the lower triangle only.
+            self.kernels[..=i].iter().enumerate().for_each(|(j, other)| unweighted[(i, j)] = dot(kernel, other));
+        }
+        let mut weights = vec![1.0; self.rows.len()];
+        let mut weighted = self.residual.to_vec();
+        let mut left = self.residual.to_vec();
+        let mut usual = scale(&left);
+        let mut before = DVector::zeros(states);
+        for round in 1.. {
+            let mut normal = unweighted.clone();
+            for (row, lost) in weights.iter().enumerate().filter(|(_, of)| **of < 1.0).map(|(row, of)| (row, 1.0 - of))
+            {
+                let at = |kernel: &Cow<[f64]>| kernel.get(row).copied().unwrap_or(0.0);
+                for i in 0..states {
+                    let taken = lost * at(&self.kernels[i]);
+                    (0..=i).for_each(|j| normal[(i, j)] -= taken * at(&self.kernels[j]));
+                }
+            }
+            let prior = (usual / reach_v).powi(2);
+            (0..states).for_each(|state| normal[(state, state)] += prior);
+            let normal = normal.cholesky()?;
+            let mut start = DVector::from_iterator(states, self.kernels.iter().map(|kernel| dot(kernel, &weighted)));
+            normal.solve_mut(&mut start);
+            let moved_v = (&start - &before).amax();
+            if round == ROUNDS || round > 1 && moved_v < SETTLED * usual {
+                return Some(Solution { start_v: start.as_slice().to_vec(), weights, normal });
+            }
+            left.copy_from_slice(&self.residual);
+            subtract(start.as_slice(), &self.kernels, &mut left);
+            usual = scale(&left);
+            let far = HUBER_THRESHOLD.get() * usual;
+            for (row, left) in left.iter().enumerate() {
+                weights[row] = if left.abs() > far { far / left.abs() } else { 1.0 };
+                weighted[row] = weights[row] * self.residual[row];
+            }
+            before = start;
+        }
+        None
+    }
+}
+
 /// Subtracts the response to the most likely initial state from a residual, estimated from the rows for which `counts`
 /// is true, with a prior of standard deviation `reach_v`, in V. Returns its [cost], in nats.
 pub(crate) fn subtract_estimate(
@@ -151,7 +211,7 @@ pub(crate) fn subtract_estimate(
     reach_v: f64,
     counts: impl Fn(usize) -> bool,
 ) -> f64 {
-    let Some(Estimate { start_v, .. }) = Estimate::of(residual, kernels, reach_v, counts) else { return 0.0 };
+    let Some(Solution { start_v, .. }) = Used::of(residual, kernels, counts).solved(reach_v) else { return 0.0 };
     subtract(&start_v, kernels, residual);
     cost(&start_v, reach_v, residual.len())
 }
@@ -162,16 +222,31 @@ pub(crate) fn cost(start_v: &[f64], reach_v: f64, rows: usize) -> f64 {
     0.5 * (rows.max(2) as f64).ln() * start_v.len() as f64 + 0.5 * dot(start_v, start_v) / reach_v.powi(2)
 }
 
-fn subtract(start: &[f64], kernels: &[Vec<f64>], from: &mut [f64]) {
+/// Returns the robust scale of a residual, in V, from rows that are equally far apart.
+fn scale(left: &[f64]) -> f64 {
+    robust_scale(&left.iter().copied().step_by(left.len().div_ceil(ROWS_OF_SCALE).max(1)).collect::<Vec<_>>())
+}
+
+fn subtract(start: &[f64], kernels: &[impl AsRef<[f64]>], from: &mut [f64]) {
     for (start, kernel) in start.iter().zip(kernels) {
-        from.iter_mut().zip(kernel).for_each(|(left, kernel)| *left -= start * kernel);
+        from.iter_mut().zip(kernel.as_ref()).for_each(|(left, kernel)| *left -= start * kernel);
     }
 }
 
-/// Returns the first row from which on a kernel stays below [`NEGLIGIBLE`] of its maximum.
-fn decay_end(kernel: &[f64]) -> usize {
-    let most = kernel.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    kernel.iter().rposition(|value| value.abs() > NEGLIGIBLE * most).map_or(0, |last| last + 1)
+/// The first rows from which on a kernel stays below [`NEGLIGIBLE`] and below [`VANISHED`] of its maximum.
+struct Ends {
+    negligible: usize,
+    vanished: usize,
+}
+
+impl Ends {
+    fn of(kernel: &[f64]) -> Self {
+        let most = kernel.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let end =
+            |rows: &[f64], least: f64| rows.iter().rposition(|value| value.abs() > least).map_or(0, |last| last + 1);
+        let vanished = end(kernel, VANISHED * most);
+        Self { negligible: end(&kernel[..vanished], NEGLIGIBLE * most), vanished }
+    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 use crate::plant::initial_state::InitialState;
 use crate::record::scales::REFERENCE_VOLTAGE_V;
-use crate::record::signal::{Lag, Oscillator, Piece, Signal, pass_lags};
+use crate::record::signal::{DECAYED, Lag, Oscillator, Piece, Signal, pass_lags};
 use simulation::plant_file::{self, Mode, PlantFile};
 
 /// A further lag and its weight.
@@ -42,6 +42,8 @@ const EXPONENTIAL: f64 = 4.0;
 const STEP_BY_STATE: f64 = 16.0;
 /// Work of one piece of an oscillation, in units of one lag.
 const WORK_OF_MODE: f64 = 6.0;
+/// Work of a piece of a free response, beside that of its lags and oscillations, in units of one lag.
+const FREE_PIECE: f64 = 2.0;
 /// Further work of a piece that is not as long as the one before it, through one of a bank of lags and through an oscillation.
 const IRREGULAR_LAG: f64 = 1.0;
 const IRREGULAR_MODE: f64 = 25.0;
@@ -301,6 +303,12 @@ impl Relaxation {
         pieces * (first + lags + modes)
     }
 
+    /// Returns the work of a free response over a number of pieces, in units of one lag, of a relaxation that is linear.
+    pub fn free_work(&self, pieces: usize) -> f64 {
+        let lags = 1.0 + self.parts().count() as f64;
+        pieces as f64 * (FREE_PIECE + lags + WORK_OF_MODE * self.oscillations().count() as f64)
+    }
+
     /// Returns the number of integration steps of a piece where the spring's state sets the time constant.
     fn steps(&self, duration_s: f64) -> f64 {
         (duration_s / (STEP * self.tau_s.min(self.tau_high_s))).ceil().clamp(1.0, MOST_STEPS)
@@ -368,6 +376,35 @@ impl Running {
         let lags = self.lags.iter().map(|(part, lag)| part * lag.value());
         let oscillations = self.oscillations.iter().map(|(mode, oscillator)| output(mode, oscillator));
         self.first_weight * self.lag.value() + lags.chain(oscillations).sum::<f64>()
+    }
+
+    /// Adds the stiffness at some times, in s, from now at the first of them on, while the settled stiffness is 0; the relaxation must be
+    /// linear. Returns the largest number of steps until a lag or an oscillation has decayed.
+    pub fn add_free(self, time_s: &[f64], response: &mut [f64]) -> usize {
+        let mut steps = 0;
+        let first = (self.first_weight, self.lag);
+        for (weight, mut lag) in self.lags.into_iter().chain([first]) {
+            for (step, at) in response.iter_mut().enumerate() {
+                if lag.value().abs() < DECAYED {
+                    break;
+                }
+                *at += weight * lag.value();
+                lag.pass_free(time_s.get(step + 1).map_or(0.0, |next| next - time_s[step]));
+                steps = steps.max(step);
+            }
+        }
+        for (mode, mut oscillator) in self.oscillations {
+            for (step, at) in response.iter_mut().enumerate() {
+                if oscillator.value().abs().max(oscillator.scaled_rate().abs()) < DECAYED {
+                    break;
+                }
+                *at += output(&mode, &oscillator);
+                let duration_s = time_s.get(step + 1).map_or(0.0, |next| next - time_s[step]);
+                oscillator.pass(Piece { duration_s, from: 0.0, to: 0.0 });
+                steps = steps.max(step);
+            }
+        }
+        steps
     }
 
     /// Advances over one piece of the settled stiffness and returns the stiffness at its start and end, both in V. `level_v` is the

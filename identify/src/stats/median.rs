@@ -15,7 +15,8 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
 /// values, in their unit; `None` if there are none.
 pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
     // Positive numbers are ordered as their bits, which are compared faster.
-    let mut sizes: Vec<u64> = values.map(|value| value.abs().to_bits()).collect();
+    let mut sizes = Vec::with_capacity(values.size_hint().1.unwrap_or(0));
+    sizes.extend(values.map(|value| value.abs().to_bits()));
     let middle = sizes.len() / 2;
     (!sizes.is_empty()).then(|| f64::from_bits(*sizes.select_nth_unstable(middle).1) / NORMAL_MEDIAN_SIZE)
 }

@@ -74,18 +74,31 @@ impl Lag {
     #[inline]
     pub fn pass(&mut self, Piece { duration_s, from, to }: Piece) -> (f64, f64) {
         let start = self.value;
+        let Factors { kept, ramp, held, .. } = self.factors_of(duration_s);
+        if duration_s > 0.0 {
+            // Only the first product depends on the previous piece, so the others can be computed ahead.
+            self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
+        }
+        (start, self.value)
+    }
+
+    /// Advances over a duration, in s, in which the input is 0.
+    #[inline]
+    pub fn pass_free(&mut self, duration_s: f64) {
+        if duration_s > 0.0 {
+            self.value *= self.factors_of(duration_s).kept;
+        }
+    }
+
+    #[inline]
+    fn factors_of(&mut self, duration_s: f64) -> Factors {
         if self.factors[0].differ_from(duration_s) {
             self.factors.swap(0, 1);
             if self.factors[0].differ_from(duration_s) {
                 self.factors[0] = Factors::of(duration_s, self.tau_s);
             }
         }
-        if duration_s > 0.0 {
-            let Factors { kept, ramp, held, .. } = self.factors[0];
-            // Only the first product depends on the previous piece, so the others can be computed ahead.
-            self.value = kept * start + (held * from + ramp * to + NO_SUBNORMAL);
-        }
-        (start, self.value)
+        self.factors[0]
     }
 
     /// Moves the output to where it would be if the last piece's input had ended `more` higher.
@@ -103,7 +116,7 @@ struct BankFactors<const N: usize> {
 }
 
 /// Free responses to 1 V count as decayed below this, in V.
-const DECAYED: f64 = 1e-12;
+pub const DECAYED: f64 = 1e-12;
 /// Number of pieces after which a free response is checked for its end.
 const PIECES_TO_CHECK: usize = 32;
 

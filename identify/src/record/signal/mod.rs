@@ -9,6 +9,6 @@ mod lag;
 mod oscillator;
 mod piecewise;
 
-pub use lag::{Lag, pass_lags};
+pub use lag::{DECAYED, Lag, pass_lags};
 pub use oscillator::Oscillator;
 pub use piecewise::{Piece, Signal};

@@ -76,6 +76,14 @@ impl Signal {
         &self.pieces
     }
 
+    /// Returns the pieces in the order of time, each with whether a row is at its start.
+    pub fn pieces_and_rows(&self) -> impl Iterator<Item = (Piece, bool)> {
+        let mut rows = self.rows.iter().peekable();
+        let with_row =
+            move |(index, piece): (usize, &Piece)| (*piece, rows.next_if(|&&row| row as usize == index).is_some());
+        self.pieces.iter().enumerate().map(with_row)
+    }
+
     /// Returns the number of pieces for which a filter has to compute its factors anew: those that are as long as neither of the last two
     /// different durations. A delay that divides every row into the same two pieces makes none.
     pub fn new_durations(&self) -> usize {
