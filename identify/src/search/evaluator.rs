@@ -289,8 +289,10 @@ impl Evaluator for Engine<'_> {
     }
 
     fn go_on(&mut self, best: &Fit) -> bool {
-        // Beyond a bound of the sensor a residual is no error.
-        let [left, before] = [&best.residual, &self.baseline_residual].map(|residual| self.observed.rms(residual));
+        // Beyond a bound of the sensor a residual is no error, and noise is none of the simulation.
+        let beyond_noise =
+            |residual: &[f64]| (self.observed.rms(residual).powi(2) - best.noise.sigma.powi(2)).max(0.0).sqrt();
+        let [left, before] = [&best.residual, &self.baseline_residual].map(|residual| beyond_noise(residual));
         !best.model.blocks.is_empty() && left < PART_LEFT * before && self.budget().go_on()
     }
 
@@ -303,7 +305,8 @@ impl Evaluator for Engine<'_> {
     }
 }
 
-/// Largest part of the errors, root mean square, that a search may leave to get more work: where nothing fits, more is no use.
+/// Largest part of the errors beyond the noise, root mean square, that a search may leave to get more work: where nothing fits, more is no
+/// use.
 const PART_LEFT: f64 = 0.5;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
@@ -480,10 +483,12 @@ impl<'f> Screening<'f> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::budget::{Budget, Effort};
+    use crate::fit::stop::Stop;
     use crate::plant::base::Base;
     use crate::record::data::Data;
     use crate::record::input::Input;
-    use crate::record::observed::Observed;
+    use crate::record::observed::{Kind, Observed};
     use simulation::record::{Record, Row};
 
     /// A spring at 100 V.
@@ -534,6 +539,33 @@ mod tests {
         // Another lag has its place.
         let both = amplifier.with(block("series-lag", 0), vec![0.0]);
         assert!(Evaluator::simpler(&engine, &both).is_empty());
+    }
+
+    /// A search whose work has ended at a residual, of a simulation that leaves 2 V without causes.
+    #[test]
+    fn a_search_goes_on_that_leaves_little_beyond_the_noise() {
+        let data = data();
+        let (plain, base) = (Observed::new(&data), Base::paper());
+        let goes_on = |observed: &Observed, causes: bool, left: f64, noise: f64| {
+            let budget = Budget::new(Effort::Normal, data.rows(), Stop::default());
+            budget.grant(1.0);
+            budget.spend(budget.granted());
+            let mut engine = Engine::within(&data, observed, &base, &budget);
+            engine.baseline_residual = vec![2f64.copysign(left); 20];
+            let hysteresis = Block { effect: index_of("hysteresis").unwrap(), form: 0 };
+            let model = if causes { Model::default().with(hysteresis, vec![3.0]) } else { Model::default() };
+            let mut best = engine.evaluate(model);
+            best.residual = vec![left; 20];
+            best.noise.sigma = noise;
+            Evaluator::go_on(&mut engine, &best)
+        };
+        assert!(goes_on(&plain, true, 0.9, 0.0) && !goes_on(&plain, true, 1.1, 0.0));
+        // Of 1.1 V, 0.9 V are noise.
+        assert!(goes_on(&plain, true, 1.1, 0.9) && !goes_on(&plain, true, 1.5, 0.9));
+        assert!(!goes_on(&plain, false, 0.9, 0.0), "no cause was found");
+        // Readings that stopped at the upper bound, below the prediction.
+        let bounded = Observed { kinds: vec![Kind::AtLeast; 20], ..plain.clone() };
+        assert!(!goes_on(&bounded, true, -0.9, 0.0), "nothing was left from the beginning");
     }
 
     /// Five forms of one effect promise more than one of another.
