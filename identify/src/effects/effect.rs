@@ -194,6 +194,11 @@ pub trait Effect: Sync {
         false
     }
 
+    /// Returns the first of the last rows if the effect changes those alone; `None` elsewhere.
+    fn first_of_last_rows(&self, _form: usize, _point: &[f64], _data: &Data) -> Option<usize> {
+        None
+    }
+
     /// Returns the form and the point at which the effect alone responds as it does at a point together with a gain; `None` if no form
     /// includes a gain.
     fn with_gain(&self, _form: usize, _point: &[f64], _gain: f64, _data: &Data) -> Option<(usize, Vec<f64>)> {

@@ -114,6 +114,11 @@ impl Effect for ReadingOffset {
         Affects::Readings
     }
 
+    fn first_of_last_rows(&self, form: usize, point: &[f64], data: &Data) -> Option<usize> {
+        let (rows, _) = shifted(form, point, data.rows());
+        (form != LEVELS && rows.start > 0 && rows.end == data.rows()).then_some(rows.start)
+    }
+
     fn description(&self) -> &'static str {
         "a stretch of readings, or all, is shifted"
     }

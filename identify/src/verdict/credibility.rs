@@ -113,6 +113,11 @@ pub(crate) fn of_spoiling(findings: &mut [Finding], spoiling: &[Spoils]) {
     findings.iter_mut().filter(spoils).for_each(|finding| lower(finding, IF_SPOILING.get()));
 }
 
+/// Lowers the probability of a cause that an error of the simulation could not be distinguished from.
+pub(crate) fn of_unconfirmed(finding: &mut Finding) {
+    lower(finding, IF_SPOILING.get());
+}
+
 /// Returns true if readings are shifted to as many levels as are looked for, and lowers that probability: so many follow any law that no
 /// cause describes, while a sensor is knocked a few times.
 pub(crate) fn of_levels_without_end(findings: &mut [Finding]) -> bool {

@@ -10,6 +10,7 @@ use crate::stats::thresholds::empirical::SHARE_UNEXPLAINED;
 use crate::verdict::credibility;
 use crate::verdict::extrapolation::spoiling;
 use crate::verdict::found::Found;
+use crate::verdict::unconfirmed;
 
 /// The sentence on a search that its budget ended.
 const UNFINISHED: &str = "The search ended before it had tried all that it would, and the residual may hold structure: a larger effort may find more";
@@ -54,6 +55,7 @@ pub(crate) fn weigh(
     let is_lacking = of_record.identified && credibility::are_linear(findings);
     let is_endless = credibility::of_levels_without_end(findings);
     credibility::of_spoiling(findings, &spoiling);
+    unconfirmed::weigh(engine, extended, findings);
     let in_findings = [(is_unearned, UNEARNED), (is_lacking, LACKING), (is_endless, ENDLESS)];
     let doubt = in_residual.or_else(|| in_findings.iter().find(|(is, _)| *is).map(|(_, of)| (*of).to_owned()))?;
     let share = unmodelled.map_or(0.0, |found| found.share);

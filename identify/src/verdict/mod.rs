@@ -10,6 +10,7 @@
 //! | margins | smallest errors of gain and time constant that a record without findings would have shown |
 //! | export | the extended simulation as a plant file |
 //! | suspect | a cause that comes close to a finding but is none |
+//! | unconfirmed | changes the last readings alone, and no reading after it shows whether an error of the simulation does |
 //! | ranking | the best sets of causes compared by score and held-out error |
 //! | hypotheses | the best sets with their fits, and the experiment: what the next experiment is computed from |
 //! | further rows | the errors of the extended simulation beyond the rows that were diagnosed |
@@ -38,3 +39,4 @@ pub mod ranking;
 pub mod reading_findings;
 mod restore;
 pub(crate) mod suspects;
+mod unconfirmed;
