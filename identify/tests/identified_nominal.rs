@@ -155,3 +155,15 @@ fn shifted_zero_is_named_alone() {
     let tau_s = diagnosis.plant.relaxation.tau_s[0];
     assert!((tau_s / 9.0 - 1.0).abs() < 0.1, "{tau_s} s");
 }
+
+/// The zero of the sensor steps 20 s before the record ends, no longer than the spring takes to settle: an error of its model would look
+/// the same.
+#[test]
+fn shift_of_the_last_readings_is_less_likely_than_not() {
+    let mut shifted = record(|voltage| 2.0 - 0.5 * voltage, &[9.0], 0.02);
+    shifted.rows[ROWS - 20..].iter_mut().for_each(|row| row.measured = row.measured.map(|reading| reading + 0.4));
+    let (Diagnosis { report, .. }, _) = diagnosed(shifted);
+    let probabilities: Vec<(&str, bool)> =
+        report.findings.iter().map(|finding| (finding.cause, finding.probability < 0.5)).collect();
+    assert_eq!((report.verdict, probabilities), (Verdict::Ambiguous, vec![("reading-offset", true)]), "{report:?}");
+}
