@@ -167,3 +167,31 @@ fn shift_of_the_last_readings_is_less_likely_than_not() {
         report.findings.iter().map(|finding| (finding.cause, finding.probability < 0.5)).collect();
     assert_eq!((report.verdict, probabilities), (Verdict::Ambiguous, vec![("reading-offset", true)]), "{report:?}");
 }
+
+/// A slow amplifier in front of a curve. The linear model that predicts best has a delay instead, which no cause can take away again.
+#[test]
+fn amplifier_that_a_delay_imitates_is_named_with_the_curve() {
+    let curve = |voltage: f64| 7.0 + 3.0 * ((voltage - 16.0) / 2.5).tanh();
+    let voltage = levels();
+    let (errors, mut across_v, mut lag) = (normals(), voltage[0], curve(voltage[0]));
+    let row = |row: usize| {
+        let measured = Some(lag + 0.02 * errors[row]);
+        for _ in 0..200 {
+            across_v += (voltage[row] - across_v).clamp(-0.5 * 0.005, 0.5 * 0.005);
+            lag += (curve(across_v) - lag) * 0.005 / 6.0;
+        }
+        Row { line: row + 2, time_s: row as f64, voltage_v: voltage[row], measured }
+    };
+    let record = Record { name: "levels".into(), rows: (0..ROWS).map(row).collect() };
+    let found = identify(std::slice::from_ref(&record), Input::Hold, &Units::default()).unwrap();
+    assert!(found.report.nominal.delay_s.value > 0.0, "{:?}", found.report.nominal);
+    assert!(found.simpler.unwrap().amplifier.is_none(), "a spring without a delay");
+    let (Diagnosis { report, .. }, _) = diagnosed(record);
+    let mut causes: Vec<&str> = report.findings.iter().map(|finding| finding.cause).collect();
+    causes.sort_unstable();
+    assert_eq!(
+        (report.verdict, causes),
+        (Verdict::Explained, vec!["amplifier-slew", "static-nonlinearity"]),
+        "{report:?}"
+    );
+}

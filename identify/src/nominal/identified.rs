@@ -23,8 +23,8 @@ pub struct Identified {
     pub report: Report,
     /// The spring as a plant file.
     pub plant: PlantFile,
-    /// The best spring of the lowest order that may lack no more than a cause, as a plant file; `None` if no lower order is: what is not
-    /// linear makes a model of higher order better, which imitates it.
+    /// The best spring of the lowest order that may lack no more than a cause, without a delay if one may, as a plant file; `None` if that
+    /// is the one that was identified: what is not linear makes a model of higher order or with a delay better, which imitates it.
     pub simpler: Option<PlantFile>,
     /// True if the spring was taken to be at rest when each record begins.
     pub settled: bool,
@@ -58,7 +58,12 @@ pub struct Course {
 
 /// Describes the chosen model of some records; the best linear model is left to the caller.
 pub(super) fn described(records: &[Record], models: &Models, voltage: VoltageRange, units: &Units) -> Identified {
-    let simpler = models.simpler().map(|order| of_order(records, models, order, voltage, units).plant);
+    let of_lower = models.simpler();
+    let without_delay = models.without_delay(of_lower.unwrap_or(models.chosen));
+    let simpler = match &without_delay {
+        Some(without) => Some(of_order(records, without, without.chosen, voltage, units).plant),
+        None => of_lower.map(|order| of_order(records, models, order, voltage, units).plant),
+    };
     Identified { simpler, ..of_order(records, models, models.chosen, voltage, units) }
 }
 

@@ -19,7 +19,7 @@ mod usable;
 mod zero_shifts;
 
 pub use identified::{Course, Identified};
-pub use models::{BestLinear, WORTHWHILE, best_linear, is_unpredictive};
+pub use models::{BestLinear, PRICE_OF_POLE, WORTHWHILE, best_linear, is_unpredictive};
 
 use std::borrow::Cow;
 

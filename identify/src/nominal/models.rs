@@ -3,7 +3,7 @@
 use simulation::record::Record;
 
 use crate::answer::LinearError;
-use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, held_out_residual};
+use crate::linear::{Fit, Poles, Problem, Series, best_of_each_order, best_up_to, held_out_residual};
 use crate::nominal::covariance::Spectrum;
 use crate::nominal::report::{InputLaw, Quantity, Report};
 use crate::nominal::usable::check;
@@ -22,7 +22,7 @@ pub const WORTHWHILE: f64 = 0.005;
 /// it is preferred: beyond, it does not hold at all. Below, a remark says what is lost.
 pub(super) const MOST_SPOILED: f64 = 10.0;
 /// Gain in log-likelihood, in nats, that each further pole has to bring beyond chance.
-const PRICE_OF_POLE: f64 = 4.0;
+pub const PRICE_OF_POLE: f64 = 4.0;
 /// Gain in log-likelihood, in nats, that each further pole has to bring if the last part of the records confirms it by a smaller error.
 const PRICE_IF_CONFIRMED: f64 = 3.0;
 /// Errors that are larger than their scatter from row to row by this factor are no noise of the sensor.
@@ -56,6 +56,13 @@ pub(super) struct Model {
     pub(super) last_part: f64,
 }
 
+impl Model {
+    fn of(problem: &Problem, fit: Fit) -> Self {
+        let held_out = held_out_residual(problem, &fit);
+        Self { last_part: last_part(problem, &fit.poles), held_out, fit }
+    }
+}
+
 /// The best linear model of some records.
 #[derive(Clone, Debug)]
 pub struct BestLinear {
@@ -83,10 +90,7 @@ impl Models {
 
     fn with_starts(series: Vec<Series>, law: InputLaw, order: Option<usize>) -> Self {
         let problem = Problem::new(series);
-        let with_errors = |fit: Fit| {
-            let held_out = held_out_residual(&problem, &fit);
-            Model { last_part: last_part(&problem, &fit.poles), held_out, fit }
-        };
+        let with_errors = |fit: Fit| Model::of(&problem, fit);
         let mut fits: Vec<Model> = best_of_each_order(&problem).map(with_errors).collect();
         let mut chosen = unbeaten(&problem, &fits);
         if let Some(order) = order {
@@ -125,6 +129,27 @@ impl Models {
     pub(super) fn simpler(&self) -> Option<usize> {
         let held_out = |order: usize| root_mean_square(&self.fits[order].held_out);
         (1..self.chosen).find(|order| held_out(*order) < IMITATED * held_out(self.chosen))
+    }
+
+    /// The best models without a delay, up to the lowest order that may lack no more than a cause, which is chosen; `None` if the chosen
+    /// model has no delay, or none of at most `largest` poles is such a one. A delay imitates what makes the response late.
+    pub(super) fn without_delay(&self, largest: usize) -> Option<Self> {
+        if self.best_fit().poles.delay <= 0.0 {
+            return None;
+        }
+        let mut problem = Problem::new(self.problem.series.clone());
+        problem.bounds.delay = (0.0, 0.0);
+        let most = IMITATED * self.held_out_rmse();
+        let (mut fits, mut is_as_good) = (Vec::new(), false);
+        for model in best_up_to(&problem, largest).map(|fit| Model::of(&problem, fit)) {
+            is_as_good = !fits.is_empty() && root_mean_square(&model.held_out) < most;
+            fits.push(model);
+            if is_as_good {
+                break;
+            }
+        }
+        let chosen = fits.len() - 1;
+        is_as_good.then_some(Self { law: self.law, problem, fits, chosen, in_place_of: None })
     }
 
     pub(super) fn best_fit(&self) -> &Fit {
