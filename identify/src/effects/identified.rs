@@ -14,6 +14,9 @@ use crate::plant::relaxation::{Part, Relaxation, contributes};
 use crate::record::data::Data;
 use simulation::plant_file::Mode;
 
+/// Causes that are linear dynamics of the spring, of which an identified one has its own.
+pub const LINEAR_DYNAMICS: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
+
 /// Place of the first time constant among the [`coordinates`].
 pub const TIME_CONSTANT: usize = 1;
 /// Largest change of a weight, relative to the static gain.

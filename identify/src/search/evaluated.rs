@@ -125,10 +125,18 @@ impl Evaluated {
         others
     }
 
-    /// The best of all structures without an effect and without every effect that contains it as a special case.
-    pub(super) fn best_without(&self, effect: usize) -> Option<Scored> {
+    /// The score by which a structure is compared with another explanation, in nats: without the price of what may belong to the nominal
+    /// spring beyond its price there.
+    pub(super) fn compared(&self, evaluator: &impl Evaluator, scored: &Scored) -> f64 {
+        let blocks = scored.fit.model.blocks.iter();
+        scored.score + self.penalty_factor * blocks.map(|(block, _)| evaluator.excess_price(block)).sum::<f64>()
+    }
+
+    /// The best of all structures, as they are compared, without an effect and without every effect that contains it as a special case.
+    pub(super) fn best_without(&self, evaluator: &impl Evaluator, effect: usize) -> Option<Scored> {
         let has = |model: &Model| effects(model).into_iter().any(|other| other == effect || contains(other, effect));
         let without = self.scored.values().filter(|scored| scored.score.is_finite() && !has(&scored.fit.model));
-        without.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()
+        let compared = |scored: &Scored| self.compared(evaluator, scored);
+        without.max_by(|a, b| compared(a).total_cmp(&compared(b))).cloned()
     }
 }

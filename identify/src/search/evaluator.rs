@@ -6,10 +6,12 @@ use std::collections::HashSet;
 
 use crate::adequacy;
 use crate::effects::effect::{FitContext, Location};
+use crate::effects::identified::LINEAR_DYNAMICS;
 use crate::effects::model::{Block, Model};
 use crate::effects::{EFFECTS, index_of};
 use crate::fit::engine::{Engine, Fit};
 use crate::noise::{Noise, autocorrelation};
+use crate::nominal::PRICE_OF_POLE;
 use crate::search::first_fits::{Start, first_fits};
 use crate::search::initial_models::{initial_models, late_models};
 use crate::search::joint_gain::joint_extensions;
@@ -90,6 +92,12 @@ pub trait Evaluator {
 
     /// Price of a block, in nats.
     fn price(&self, block: &Block) -> f64;
+
+    /// Price of a block, in nats, that a comparison with other causes does not count: what linear dynamics cost more than as a part of the
+    /// nominal spring, if that was identified from the same readings.
+    fn excess_price(&self, _block: &Block) -> f64 {
+        0.0
+    }
 
     /// The stage of the chain that a block changes at a point.
     fn location(&self, block: &Block, _point: &[f64]) -> Location {
@@ -221,6 +229,15 @@ impl Evaluator for Engine<'_> {
             + (forms as f64).ln()
     }
 
+    fn excess_price(&self, block: &Block) -> f64 {
+        if !self.data.normalisation.identified || !LINEAR_DYNAMICS.contains(&block.cause()) {
+            return 0.0;
+        }
+        let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
+        let of_identified = PRICE_OF_POLE * fitted.div_ceil(COORDINATES_OF_POLE) as f64;
+        (Evaluator::price(self, block) - of_identified).max(0.0)
+    }
+
     fn location(&self, block: &Block, point: &[f64]) -> Location {
         block.effect().location_at(block.form, point, self.data)
     }
@@ -308,6 +325,8 @@ impl Evaluator for Engine<'_> {
 /// Largest part of the errors beyond the noise, root mean square, that a search may leave to get more work: where nothing fits, more is no
 /// use.
 const PART_LEFT: f64 = 0.5;
+/// Coordinates of a pole: its place and its weight.
+const COORDINATES_OF_POLE: usize = 2;
 /// Work for each piece of the voltage from which all starts and forms are tried.
 const WORK_PER_PIECE: u64 = 40_000;
 /// Starts of each form that are tried while work is scarce.

@@ -226,9 +226,24 @@ impl<'e, E: Evaluator> Search<'e, E> {
         self.evaluated.ranked()
     }
 
-    /// The best of all evaluated structures without an effect and without every effect that contains it as a special case.
+    /// The score by which a structure is compared with another explanation of the same readings, in nats.
+    pub fn compared(&self, scored: &Scored) -> f64 {
+        self.evaluated.compared(self.evaluator, scored)
+    }
+
+    /// The best structure of each set of effects whose compared score is less than `nats` below that of another, the best set first.
+    pub fn near(&self, scored: &Scored, nats: f64) -> Vec<&Scored> {
+        let least = self.compared(scored) - nats;
+        let compared = self.ranked().into_iter().map(|other| (self.compared(other), other));
+        let mut near: Vec<(f64, &Scored)> = compared.filter(|(score, _)| *score > least).collect();
+        near.sort_by(|a, b| b.0.total_cmp(&a.0));
+        near.into_iter().map(|(_, other)| other).collect()
+    }
+
+    /// The best of all evaluated structures, as they are compared, without an effect and without every effect that contains it as a special
+    /// case.
     pub fn best_without(&self, effect: usize) -> Scored {
-        self.evaluated.best_without(effect).expect("the search starts from no effect at all")
+        self.evaluated.best_without(self.evaluator, effect).expect("the search starts from no effect at all")
     }
 
     /// One search at the present penalty factor.

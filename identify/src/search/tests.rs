@@ -30,6 +30,8 @@ struct Tabulated {
     is_followed: bool,
     /// Effect that cannot be distinguished from another cause.
     another: Option<usize>,
+    /// Effect that may belong to the nominal spring, and the part of its price that does not count in a comparison, in nats.
+    of_nominal: Option<(usize, f64)>,
     /// Number of fits; evaluations at a given point are not counted.
     fits: isize,
     /// Number of fits at which the search has to end.
@@ -54,6 +56,7 @@ fn tabulated(worth: &[(&[&str], f64)]) -> Tabulated {
         rare: None,
         is_followed: false,
         another: None,
+        of_nominal: None,
         fits: 0,
         most_fits: isize::MAX,
         further_fits: 0,
@@ -122,6 +125,10 @@ impl Evaluator for Tabulated {
 
     fn price(&self, _: &Block) -> f64 {
         PRICE
+    }
+
+    fn excess_price(&self, block: &Block) -> f64 {
+        self.of_nominal.filter(|(effect, _)| *effect == block.effect).map_or(0.0, |(_, excess)| excess)
     }
 
     fn misfit(&self, _: &Fit, times: f64, floor_v: f64) -> f64 {
@@ -360,4 +367,26 @@ fn of_structures_that_do_not_predict_the_next_likely_one_that_does_is_taken() {
     assert_eq!(taken(1.1, 0.3, &[]), [effect("delay")]);
     assert_eq!(taken(0.9, 0.7, &["drift"]), [effect("resonance")], "the one that predicts best");
     assert_eq!(taken(1.1, 1.2, &["resonance"]), [0; 0], "the simulation as it is given");
+}
+
+/// A drift is likelier than a lag by 4 nats at the same price.
+#[test]
+fn what_may_belong_to_the_nominal_spring_is_compared_at_its_price_there() {
+    let drift = vec![effect("drift")];
+    let rival_of = |of_nominal| -> (Vec<usize>, f64, Vec<Vec<usize>>) {
+        let worth: &[(&[&str], f64)] = &[(&["drift"], 104.0), (&["series-lag"], 100.0), (&["hum"], 50.0)];
+        let mut evaluator = Tabulated { of_nominal, ..tabulated(worth) };
+        let mut search = Search::new(&mut evaluator);
+        let best = search.run(|_| ());
+        assert_eq!(effects(&best.fit.model), drift);
+        let without = search.best_without(effect("drift"));
+        let odds = search.compared(&best) - search.compared(&without);
+        let near = search.near(&best, 3.0).iter().map(|scored| effects(&scored.fit.model)).collect();
+        (effects(&without.fit.model), odds, near)
+    };
+    let lag = vec![effect("series-lag")];
+    assert_eq!(rival_of(None), (lag.clone(), 4.0, vec![drift.clone()]));
+    assert_eq!(rival_of(Some((lag[0], 6.0))), (lag.clone(), -2.0, vec![lag.clone(), drift.clone()]));
+    // One that is far less likely comes no nearer.
+    assert_eq!(rival_of(Some((effect("hum"), 6.0))), (lag, 4.0, vec![drift.clone()]));
 }

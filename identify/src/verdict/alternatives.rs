@@ -21,9 +21,8 @@ const MOST_RIVALS: usize = 3;
 pub(crate) fn rivals<E: Evaluator>(search: &Search<E>, best: &Scored) -> Vec<Vec<&'static str>> {
     let own = effects(&best.fit.model);
     search
-        .ranked()
+        .near(best, RIVAL_ODDS)
         .into_iter()
-        .take_while(|other| other.score > best.score - RIVAL_ODDS)
         .map(|other| effects(&other.fit.model))
         .filter(|set| !own.iter().all(|effect| set.iter().any(|other| other == effect || contains(*other, *effect))))
         .take(MOST_RIVALS)

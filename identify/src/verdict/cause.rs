@@ -8,6 +8,8 @@ pub(crate) struct Cause {
     pub(crate) effect: usize,
     /// The best of all structures without the effect.
     pub(crate) without: Scored,
+    /// Odds against that one, in nats.
+    pub(crate) odds: f64,
     /// The best structure with the effect removed and nothing in its place.
     pub(crate) left_out: Scored,
 }

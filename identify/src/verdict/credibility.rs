@@ -24,6 +24,7 @@
 //! So do causes that are each likely, if the product of their probabilities is below [`LIKELY_TOGETHER`].
 
 use crate::answer::{Finding, Judge, Report, Suspect, Verdict};
+use crate::effects::identified::LINEAR_DYNAMICS;
 use crate::record::observed::Observed;
 use crate::stats::thresholds::empirical::{
     IF_IDENTIFIED, IF_SPOILING, IF_UNEXPLAINED, ROWS_THAT_DETECT, UNKNOWN_FORM, UNKNOWN_NOISE,
@@ -42,9 +43,6 @@ const APART: [&str; 2] = ["hum", "outliers"];
 
 /// Causes that a drift, or what an earlier voltage left behind, may be taken for.
 const SLOW: [&str; 4] = ["drift", "charge-leakage", "second-relaxation", "series-lag"];
-
-/// Causes that are linear dynamics of the spring, of which an identified one has its own.
-const LINEAR: [&str; 5] = ["charge-leakage", "second-relaxation", "series-lag", "resonance", "delay"];
 
 /// Returns the mean square error that a wrong form may remove of an unknown law without leaving structure that shows in these readings,
 /// relative to the mean square that is left; infinite if structure shows, and if readings are intervals, in which errors do not.
@@ -98,13 +96,13 @@ pub(crate) fn of_slow(findings: &mut [Finding]) {
 /// Lowers probabilities of linear dynamics beside a nominal spring that was identified from the same readings: what it lacks of them
 /// belongs to it.
 pub(crate) fn of_identified(findings: &mut [Finding]) {
-    let linear = findings.iter_mut().filter(|finding| LINEAR.contains(&finding.cause));
+    let linear = findings.iter_mut().filter(|finding| LINEAR_DYNAMICS.contains(&finding.cause));
     linear.for_each(|finding| lower(finding, IF_IDENTIFIED.get()));
 }
 
 /// True if there are linear dynamics among the causes, and no likely cause beside them.
 pub(crate) fn are_linear(findings: &[Finding]) -> bool {
-    findings.iter().any(|finding| LINEAR.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
+    findings.iter().any(|finding| LINEAR_DYNAMICS.contains(&finding.cause)) && !findings.iter().any(is_likely_cause)
 }
 
 /// Lowers probabilities of causes that spoil an extrapolation.

@@ -19,10 +19,9 @@ pub(crate) fn explained(finding: &Finding) -> f64 {
 
 /// Reports an effect of the best structure.
 pub(crate) fn finding(engine: &mut Engine, found: &Found, cause: &Cause) -> Finding {
-    let Cause { effect, without, left_out } = cause;
+    let Cause { effect, without, odds, left_out } = cause;
     let Found { best, explored, regular, .. } = found;
     let effect = *effect;
-    let odds = best.score - without.score;
     let [before, rival, after] = [left_out, without, best].map(|scored| regular.rms(&scored.fit.residual));
     let others = named(&without.fit.model);
     let rival = engine.data.scales().shown_in_four_digits(Dimension::ReadingSize, rival);

@@ -99,7 +99,11 @@ pub(crate) fn search(
         best = without;
     };
     // The best without a cause is chosen after all were evaluated, so that sentence and ranking name the same.
-    let cause = |(effect, left_out)| Cause { effect, without: search.best_without(effect), left_out };
+    let cause = |(effect, left_out)| {
+        let without = search.best_without(effect);
+        let odds = search.compared(&best) - search.compared(&without);
+        Cause { effect, without, odds, left_out }
+    };
     let causes: Vec<Cause> = effects.into_iter().zip(left_out).map(cause).collect();
     let contenders = ranking::contenders(&search, &causes);
     // Last: what the causes are compared with keeps all lags.
