@@ -3,8 +3,9 @@
 CASE is a file with a JSON object. `tick` and `panic` are the addresses of the control tick and of `core::panicking::panic`, `rtt` is
 the log's, `main` that of the program's first function after start-up, `taken` that of `cortex_m::peripheral::TAKEN`, `stack` the top of
 the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each. `random`
-is what the random number generator delivers. `settings` and `model` are stored pages, in hex. `cuts` numbers for both, for each start,
-the operation of the flash that is cut. `runs` names the runs that are wanted.
+is what the random number generator delivers, `later_us` the time that the start takes longer than in other images. `settings` and
+`model` are stored pages, in hex. `cuts` numbers for both, for each start, the operation of the flash that is cut. `runs` names the runs
+that are wanted.
 """
 
 import json
@@ -263,7 +264,8 @@ def play(host, fault, until_us, torn=(), before=None, first=None, random_number=
     if first:
         board.traps[MAIN] = first
     board.reset(POWER_ON)
-    while (cause := board.run(until_us)) is not None:
+    # Most runs have a second start.
+    while (cause := board.run(until_us + 2 * CASE["later_us"])) is not None:
         board.uc.mem_write(FLASH, IMAGE)
         board.uc.ctl_remove_cache(FLASH, FLASH + len(IMAGE))
         board.reset(cause)

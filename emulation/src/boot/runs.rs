@@ -7,11 +7,11 @@ use link::{BrownOut, FaultReport, Reason, Reply};
 use model::Amplifier;
 use model::supervisor::{Fault, Mismatch};
 use serde::Deserialize;
-use xtask::variant::{Controller, Variant};
+use xtask::variant::Variant;
 
 use super::events::{BYTE_US, Event, Events, JITTER_US, PERIOD_US, jitter};
 use super::host;
-use super::schedule::STORED_RESET_MS;
+use super::schedule::{STORED_RESET_MS, later_us};
 use crate::variant;
 
 /// Timeout of the watchdog, in us.
@@ -48,13 +48,9 @@ pub(super) fn quiet(events: &Events, image: &[u8], variant: Variant) -> Result<S
     let (setup, ticking) = events.split("watchdog started")?;
     ensure!(!ticking.times("store read").is_empty(), "the store is read before the watchdog is started, or never");
     let ticks = ticking.times("dac");
-    // The design of the robust controller takes its part of the start.
-    let latest_ms = if variant.controller == Controller::Robust { 40 } else { 20 };
-    ensure!(
-        ticks.len() > 1200 - latest_ms,
-        "{} ticks in 1.2 s, of which the start may take {latest_ms} ms",
-        ticks.len()
-    );
+    ensure!(ticks.len() > 1180, "{} ticks in 1.2 s", ticks.len());
+    let latest_us = f64::from(20_000 + later_us(variant));
+    ensure!(ticks.first().is_some_and(|first| *first < latest_us), "the first tick is later than {latest_us} us");
     let jitter = jitter(&ticks);
     ensure!(jitter < JITTER_US, "writes to the DAC are up to {jitter:.2} us off their grid of {PERIOD_US} us");
     ensure!(setup.0.iter().any(|Event(_, what, value)| what == "enable" && value == "off"), "the enable floats");

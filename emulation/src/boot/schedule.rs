@@ -9,7 +9,7 @@ use link::{Block, Desired, Fault, Frame, Part, Reason, Request, Sequence, WireMo
 use model::extended::{Law, Memory as Hysteresis, Relaxation};
 use model::{ExtendedPlant, supervisor};
 use serde_json::{Value, json};
-use xtask::variant::Variant;
+use xtask::variant::{Controller, Variant};
 
 use crate::variant;
 
@@ -28,6 +28,11 @@ const STEP_US: u32 = 20_000;
 const ERASE_US: u32 = 50_000;
 /// Time from a request to restart until the chip listens again, in us.
 const RESTART_US: u32 = 150_000;
+
+/// Time that the start of a variant takes longer than that of the others, in us: the robust controller's design is a part of it.
+pub(super) const fn later_us(variant: Variant) -> u32 {
+    if matches!(variant.controller, Controller::Robust) { 40_000 } else { 0 }
+}
 
 /// Time in us and request of each frame, whose sequence number is its index. Frames of the same time follow one another without a gap.
 #[derive(Default)]
@@ -59,16 +64,16 @@ impl Schedule {
         self.then(100_000, Request::Heartbeat);
     }
 
-    /// Returns the frames of the schedule as JSON, each with its time in us and its bytes in hex. The session is the first
-    /// of a chip whose generator delivers `random`.
-    pub(super) fn frames(&self, random: u32) -> Value {
+    /// Returns the frames of the schedule as JSON, each with its time in us, `later_us` after that of the schedule, and its bytes in hex.
+    /// The session is the first of a chip whose generator delivers `random`.
+    pub(super) fn frames(&self, random: u32, later_us: u32) -> Value {
         let nonce = Nonces::new(random).draw();
         let mut frames: Vec<(u32, String)> = Vec::new();
         for ((us, request), number) in self.0.iter().zip(0..) {
             let bytes = hex(Frame::new(nonce.stamp(Sequence(number)), request).as_bytes());
             match frames.last_mut() {
-                Some((at, before)) if *at == *us => before.push_str(&bytes),
-                _ => frames.push((*us, bytes)),
+                Some((at, before)) if *at == us + later_us => before.push_str(&bytes),
+                _ => frames.push((us + later_us, bytes)),
             }
         }
         json!(frames)
@@ -153,7 +158,7 @@ impl Replacement {
     pub(super) fn cut(&self, cuts: usize) -> Schedule {
         let mut schedule = Schedule::default();
         for _ in 0..=cuts {
-            schedule.then(ERASE_US, Request::Hello);
+            schedule.then(RESTART_US, Request::Hello);
             for request in [self.asked(), Request::Arm, Request::Disarm] {
                 schedule.then(STEP_US, request);
             }
