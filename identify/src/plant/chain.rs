@@ -351,7 +351,7 @@ impl<'a> Chain<'a> {
         if self.output_tau_s > 0.0 || !self.losses.is_empty() || !self.force.is_identity() {
             return None;
         }
-        let FromBefore { late_v, kept, .. } = self.from_before(start);
+        let FromBefore { late_v, kept, .. } = self.left_before(start);
         if kept != 0.0 {
             return None;
         }
@@ -379,7 +379,7 @@ impl<'a> Chain<'a> {
     }
 
     /// Returns what is left from the time before the first row.
-    fn from_before(&self, start: &mut InitialState) -> FromBefore {
+    fn left_before(&self, start: &mut InitialState) -> FromBefore {
         let mut next_if = |is_there: bool| if is_there { start.next_offset_v() } else { 0.0 };
         FromBefore {
             output_v: next_if(self.output_tau_s > 0.0),
@@ -402,7 +402,7 @@ impl<'a> Chain<'a> {
     /// Adds to the settled stiffness what is left from the time before the first row: voltages that arrive delayed, and play operators
     /// as the largest voltage leaves them.
     fn add_from_before(&self, applied: &Signal, signal: &mut Signal, start: &mut InitialState) {
-        let FromBefore { output_v, late_v, kept } = self.from_before(start);
+        let FromBefore { output_v, late_v, kept } = self.left_before(start);
         let mut output = Lag::at(self.output_tau_s, output_v);
         let (mut rest, mut above) = (self.memory.clone(), self.memory.clone());
         rest.at(applied.before);
