@@ -306,7 +306,7 @@ impl Evaluator for Engine<'_> {
     }
 
     fn go_on(&mut self, best: &Fit) -> bool {
-        // Beyond a bound of the sensor a residual is no error, and noise is none of the simulation.
+        // Beyond a bound of the sensor a residual is no error, and noise is no error of the simulation.
         let beyond_noise =
             |residual: &[f64]| (self.observed.rms(residual).powi(2) - best.noise.sigma.powi(2)).max(0.0).sqrt();
         let [left, before] = [&best.residual, &self.baseline_residual].map(|residual| beyond_noise(residual));
