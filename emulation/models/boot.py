@@ -2,8 +2,8 @@
 
 CASE is a file with a JSON object. `tick` and `panic` are the addresses of the control tick and of `core::panicking::panic`, `rtt` is
 the log's, `main` that of the program's first function after start-up, `taken` that of `cortex_m::peripheral::TAKEN`, `stack` the top of
-the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each. `random`
-is what the random number generator delivers, `later_us` the time that the start takes longer than in other images. `settings` and
+the stack. `volts` is the full scale of its amplifier. `hosts` is what a host sends in the runs, [time in us, bytes in hex] each, later by
+`later_us`: the start takes that time longer than in other images. `random` is what the random number generator delivers. `settings` and
 `model` are stored pages, in hex. `cuts` numbers for both, for each start, the operation of the flash that is cut. `runs` names the runs
 that are wanted.
 """
@@ -286,7 +286,7 @@ if __name__ == "__main__":
     TICK, PANIC, RTT, MAIN, TAKEN, STACK = (CASE[name] for name in ("tick", "panic", "rtt", "main", "taken", "stack"))
     FULL_SCALE, RANDOM, CUTS = CASE["volts"], CASE["random"], CASE["cuts"]
     SETTINGS, MODEL = bytes.fromhex(CASE["settings"]), bytes.fromhex(CASE["model"])
-    HOSTS = {name: [(us, bytes.fromhex(frames)) for us, frames in sent] for name, sent in CASE["hosts"].items()}
+    HOSTS = {name: [(us + CASE["later_us"], bytes.fromhex(frames)) for us, frames in sent] for name, sent in CASE["hosts"].items()}
     HOST, SETTINGS_HOST, MODEL_HOST = HOSTS["host"], HOSTS["cut settings"], HOSTS["cut model"]
     RUNS = {
         "quiet": lambda: play([], None, 1_200_000),

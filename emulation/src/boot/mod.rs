@@ -115,7 +115,6 @@ fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, is_wanted: impl Fn(
     }
     let names: Vec<&str> = checks.iter().map(|check| check.run).collect();
     let case = elf.with_extension("boot.json");
-    let later_us = schedule::later_us(variant);
     let case_of = json!({
         "tick": ticks[0].address,
         "panic": panic.address,
@@ -125,21 +124,21 @@ fn one(variant: Variant, cuts: impl Fn(usize) -> Vec<usize>, is_wanted: impl Fn(
         "stack": stack,
         "volts": amplifier.full_scale_v,
         "random": RANDOM,
-        "later_us": later_us,
+        "later_us": schedule::later_us(variant),
         "settings": schedule::hex(&page(Block::Settings, &settings.old)?),
         "model": schedule::hex(&page(Block::Model, &model.old)?),
         "cuts": { "settings": settings_cuts, "model": model_cuts },
         "runs": names,
         "hosts": {
-            "host": schedule::armed().frames(RANDOM, later_us),
+            "host": schedule::armed().frames(RANDOM),
             // Of another chip.
-            "recorded": schedule::armed().frames(!RANDOM, later_us),
-            "level": schedule::level().frames(RANDOM, later_us),
-            "flood": schedule::flood().frames(RANDOM, later_us),
-            "sent": schedule::sent(variant)?.frames(RANDOM, later_us),
-            "cut settings": settings.cut(settings_cuts.len()).frames(RANDOM, later_us),
-            "cut model": model.cut(model_cuts.len()).frames(RANDOM, later_us),
-            "protected": schedule::protected()?.frames(RANDOM, later_us),
+            "recorded": schedule::armed().frames(!RANDOM),
+            "level": schedule::level().frames(RANDOM),
+            "flood": schedule::flood().frames(RANDOM),
+            "sent": schedule::sent(variant)?.frames(RANDOM),
+            "cut settings": settings.cut(settings_cuts.len()).frames(RANDOM),
+            "cut model": model.cut(model_cuts.len()).frames(RANDOM),
+            "protected": schedule::protected()?.frames(RANDOM),
         },
     });
     fs::write(&case, case_of.to_string()).with_context(|| format!("cannot write {}", case.display()))?;

@@ -64,16 +64,16 @@ impl Schedule {
         self.then(100_000, Request::Heartbeat);
     }
 
-    /// Returns the frames of the schedule as JSON, each with its time in us, `later_us` after that of the schedule, and its bytes in hex.
-    /// The session is the first of a chip whose generator delivers `random`.
-    pub(super) fn frames(&self, random: u32, later_us: u32) -> Value {
+    /// Returns the frames of the schedule as JSON, each with its time in us and its bytes in hex. The session is the first
+    /// of a chip whose generator delivers `random`.
+    pub(super) fn frames(&self, random: u32) -> Value {
         let nonce = Nonces::new(random).draw();
         let mut frames: Vec<(u32, String)> = Vec::new();
         for ((us, request), number) in self.0.iter().zip(0..) {
             let bytes = hex(Frame::new(nonce.stamp(Sequence(number)), request).as_bytes());
             match frames.last_mut() {
-                Some((at, before)) if *at == us + later_us => before.push_str(&bytes),
-                _ => frames.push((us + later_us, bytes)),
+                Some((at, before)) if *at == *us => before.push_str(&bytes),
+                _ => frames.push((*us, bytes)),
             }
         }
         json!(frames)

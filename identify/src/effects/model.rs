@@ -39,6 +39,11 @@ impl Block {
         self.effect().coordinates(self.form, data)
     }
 
+    /// Returns the number of coordinates of the form that a fit moves.
+    pub fn fitted(&self, data: &Data) -> usize {
+        self.coordinates(data).iter().filter(|coordinate| coordinate.fitted).count()
+    }
+
     /// Returns true if some coordinates are found by search alone.
     pub fn searched(&self) -> bool {
         self.effect().searched(self.form)

@@ -381,6 +381,7 @@ impl Running {
     /// Adds the stiffness at some times, in s, from now at the first of them on, while the settled stiffness is 0; the relaxation must be
     /// linear. Returns the largest number of steps until a lag or an oscillation has decayed.
     pub fn add_free(self, time_s: &[f64], response: &mut [f64]) -> usize {
+        let until_next_s = |row: usize| time_s.get(row + 1).map_or(0.0, |next| next - time_s[row]);
         let mut steps = 0;
         let first = (self.first_weight, self.lag);
         for (weight, mut lag) in self.lags.into_iter().chain([first]) {
@@ -389,7 +390,7 @@ impl Running {
                     break;
                 }
                 *at += weight * lag.value();
-                lag.pass_free(time_s.get(step + 1).map_or(0.0, |next| next - time_s[step]));
+                lag.pass_free(until_next_s(step));
                 steps = steps.max(step);
             }
         }
@@ -399,8 +400,7 @@ impl Running {
                     break;
                 }
                 *at += output(&mode, &oscillator);
-                let duration_s = time_s.get(step + 1).map_or(0.0, |next| next - time_s[step]);
-                oscillator.pass(Piece { duration_s, from: 0.0, to: 0.0 });
+                oscillator.pass(Piece { duration_s: until_next_s(step), from: 0.0, to: 0.0 });
                 steps = steps.max(step);
             }
         }

@@ -222,9 +222,8 @@ impl Evaluator for Engine<'_> {
     fn price(&self, block: &Block) -> f64 {
         let effect = block.effect();
         let forms = if block.form < effect.common_forms() { effect.common_forms() } else { effect.forms() };
-        let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
         PRICE_OF_BLOCK.get()
-            + PRICE_OF_COORDINATE.get() * fitted as f64
+            + PRICE_OF_COORDINATE.get() * block.fitted(self.data) as f64
             + effect.ln_candidates(block.form, self.data)
             + (forms as f64).ln()
     }
@@ -233,8 +232,7 @@ impl Evaluator for Engine<'_> {
         if !self.data.normalisation.identified || !LINEAR_DYNAMICS.contains(&block.cause()) {
             return 0.0;
         }
-        let fitted = block.coordinates(self.data).iter().filter(|coordinate| coordinate.fitted).count();
-        let of_identified = PRICE_OF_POLE * fitted.div_ceil(COORDINATES_OF_POLE) as f64;
+        let of_identified = PRICE_OF_POLE * block.fitted(self.data).div_ceil(COORDINATES_OF_POLE) as f64;
         (Evaluator::price(self, block) - of_identified).max(0.0)
     }
 

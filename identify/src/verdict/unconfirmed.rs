@@ -59,14 +59,13 @@ mod tests {
             model = model.with(block("delay", 0), vec![delay_s, 0.0]);
         }
         let extended = engine.evaluate(model);
-        let (parameters, evidence) = (Vec::new(), String::new());
         let finding = |cause| Finding {
             cause,
             probability: 0.9,
-            parameters: parameters.clone(),
+            parameters: Vec::new(),
             rmse_before: 2.0,
             rmse_after: 1.0,
-            evidence: evidence.clone(),
+            evidence: String::new(),
             proved: false,
         };
         let mut findings = [finding("hysteresis"), finding("reading-offset")];
