@@ -48,7 +48,7 @@
 //!
 //! **Robustness.** The innovation is clipped (Huber's bounded influence), more tightly where the spring may only be
 //! late. With the robust pre-compensator, readings that show a spring ahead of its model, two in a row or the mean of the last ones, are
-//! used without the delay of `L`.
+//! used without the delay of `L`, and those of a spring that has answered the beginning of the movement without delay with less of it.
 //!
 //! **Faults.** The module [`fault_detection`] decides in each tick whether the sensor is trusted. While it is not, `d`
 //! decays to 0 V with the time constant [`Feedback::fade_s`], and the loop becomes the one without a sensor. When the
@@ -73,6 +73,8 @@ pub const SENSOR_NAMES: [&str; 7] = ["none", "trusted", "absent", "stale", "stuc
 pub(crate) enum Observed {
     /// The sensor is trusted, and its reading was used.
     Reading,
+    /// The sensor is trusted, and its reading was used, more quickly, as the spring follows its model without delay.
+    Prompt,
     /// The sensor is trusted, and its last readings have shown a spring ahead of its model: part of that was used without delay.
     Ahead,
     /// The sensor is trusted, and there was none to use.

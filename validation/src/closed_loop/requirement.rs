@@ -185,6 +185,7 @@ pub fn criteria(controller: &str, outcomes: &[Outcome]) -> Vec<Criterion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground_truth::Effect;
     use model::{Amplifier, Compensation, Feedback, Margin};
 
     fn robust() -> Settings {
@@ -234,5 +235,40 @@ mod tests {
         let met = |outcome| criteria("it", &[outcome]).iter().map(Criterion::is_met).collect::<Vec<_>>();
         assert_eq!(met(outcome(late, 2.5)), [false, false]);
         assert_eq!(met(outcome(Step { shortest_s: 0.67, ..late }, 2.0)), [true, true]);
+    }
+
+    /// The five steps upward of a spring with this effect.
+    fn steps_up(cause: Cause, full_size: &[f64], neutral: &[f64]) -> Vec<stair::Step> {
+        let effect = Effect { cause, form: 0, full_size: full_size.to_vec(), neutral: neutral.to_vec(), size: 1.0 };
+        let scenario = Scenario { effects: vec![effect], ..Scenario::nothing(1) };
+        let run = scenario.run_watched(&robust(), REST_TICKS, |_, read| fresh(read), |_, _| ()).unwrap();
+        let truth: Vec<f64> = run.iter().map(|sample| sample.truth).collect();
+        stair::steps(&truth, robust().rate_hz).into_iter().filter(|step| step.up).collect()
+    }
+
+    /// Delays that a sensor or an amplifier may have, which no correction may excite: the last step takes as much longer.
+    #[test]
+    fn a_delay_of_some_milliseconds_does_not_make_a_step_overshoot() {
+        for delay_s in [0.001, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012, 0.016] {
+            let steps = steps_up(Cause::Delay, &[delay_s], &[0.0]);
+            assert!(steps.iter().all(|step| step.overshoot_percent < 2.0), "{delay_s} {steps:?}");
+            assert!((steps[4].t97_s.unwrap() - 0.461 - delay_s).abs() < 0.003, "{delay_s} {steps:?}");
+        }
+    }
+
+    /// A mode of the spring that answers within some milliseconds, and then oscillates.
+    #[test]
+    fn a_fast_mode_is_not_taken_for_a_spring_without_a_delay_for_long() {
+        for frequency_hz in [60.0, 120.0, 240.0] {
+            let steps = steps_up(Cause::Resonance, &[frequency_hz, 0.05, 1.0], &[frequency_hz, 0.05, 0.0]);
+            assert!(steps.iter().all(|step| step.overshoot_percent < 6.0), "{frequency_hz} Hz {steps:?}");
+        }
+    }
+
+    /// Its time constant is up to 8.4 s instead of 5.5 s, and it answers without a delay.
+    #[test]
+    fn a_spring_that_is_half_slower_is_as_fast_as_it_can_be() {
+        let slow = one(&robust(), Fault::Effect(Cause::VoltageDependentTimeConstant), 2..3).unwrap();
+        assert_eq!(slow.in_time, [5, 5, 5], "{slow:?}");
     }
 }

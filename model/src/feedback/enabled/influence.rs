@@ -29,9 +29,18 @@
 //!   that is late, because of a lag, a slow amplifier or a smaller share, would otherwise be driven beyond its target by what its delay
 //!   has added. A correction that goes to 0 V excites nothing: the loop is that of the model alone then.
 //! - For an innovation that takes a correction back, the bound is wider by that correction.
+//! - A spring that is **prompt** ([`response`](super::response)) is not late when it is behind, but slower or smaller than its model. A
+//!   sixteenth of each innovation, clipped to `6 noise_v`, is added without delay as long as the model has moved recently: the correction
+//!   has a time constant of 16 readings. Two innovations in a row have to be ahead by more than `3 noise_v` unless they take a correction
+//!   back, since smaller ones are corrected quickly anyway, and with less noise.
 
 use super::envelope::{self, Envelope};
+use super::response::Response;
+use crate::feedback::Observed;
 use crate::units::Signal;
+
+/// Number of binary digits by which an innovation of a prompt spring is divided: a sixteenth of it is added without delay.
+pub(super) const PROMPT_SHIFT: u32 = 4;
 
 /// Bounds for one interval between readings, quantized for the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,12 +60,14 @@ pub(super) struct State {
 }
 
 /// What an innovation adds to the correction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Influence {
     /// The clipped innovation, of which the gain adds a part, in V.
     pub(super) clipped: Signal,
     /// Part of the innovation that is added without delay, in V.
     pub(super) quick: Signal,
+    /// How the innovation was used.
+    pub(super) observed: Observed,
 }
 
 impl State {
@@ -77,7 +88,7 @@ impl Config {
     #[inline]
     pub(super) fn of(
         &self,
-        state: &mut State,
+        (state, response): (&mut State, &mut Response),
         innovation: Signal,
         correction: Signal,
         model: Signal,
@@ -91,21 +102,34 @@ impl Config {
         let up = innovation >= Signal::ZERO;
         let mirrored = |signal: Signal| if up { signal } else { signal.saturating_neg() };
         let (moved, behind) = if up { (risen, was_negative) } else { (fallen, was_positive) };
-        let ahead = if behind > self.noise { Signal::ZERO } else { moved };
         let size = mirrored(innovation);
         if !self.is_quick {
-            return Influence { clipped: mirrored(size.min(self.noise.saturating_add(ahead))), quick: Signal::ZERO };
+            let ahead = if behind > self.noise { Signal::ZERO } else { moved };
+            let clipped = mirrored(size.min(self.noise.saturating_add(ahead)));
+            return Influence { clipped, quick: Signal::ZERO, observed: Observed::Reading };
         }
+        let (far, late, early) =
+            if risen > fallen { (risen, was_negative, was_positive) } else { (fallen, was_positive, was_negative) };
+        *response = response.after(far, late, early, self.noise);
+        let is_prompt = *response == Response::Prompt;
+        let ahead = if behind > self.noise { Signal::ZERO } else { moved };
         let back = mirrored(correction).saturating_neg().max(Signal::ZERO);
         let bound = self.noise.saturating_add(ahead).saturating_add(back);
         let bounded = mirrored(size.min(self.noise >> 1));
         state.mean = state.mean.saturating_add(bounded.saturating_sub(state.mean) >> 2);
         let (twice, mean) = (size.min(mirrored(last)), mirrored(state.mean));
-        let shown = if twice > self.noise >> 2 { twice } else { mean };
+        let least = if is_prompt && back == Signal::ZERO { self.noise >> 1 } else { self.noise >> 2 };
+        let shown = if twice > least { twice } else { mean };
         let used = shown.min(ahead.max(back.min(moved)));
         let quick = if moved > self.noise && used > self.noise >> 3 { used - (used >> 2) } else { Signal::ZERO };
         state.mean = mirrored(mean.saturating_sub(quick).max(mean.min(Signal::ZERO)));
-        Influence { clipped: mirrored(size.min(bound)), quick: mirrored(quick) }
+        let observed = match is_prompt {
+            _ if quick != Signal::ZERO => Observed::Ahead,
+            true => Observed::Prompt,
+            false => Observed::Reading,
+        };
+        let prompt = if is_prompt { size.min(self.noise) >> PROMPT_SHIFT } else { Signal::ZERO };
+        Influence { clipped: mirrored(size.min(bound)), quick: mirrored(quick.saturating_add(prompt)), observed }
     }
 }
 
@@ -117,12 +141,24 @@ mod tests {
 
     /// What each of these innovations adds to a correction in V, clipped and without delay, while the model has moved from 0 V to there.
     fn after<const N: usize>(moved: f64, is_quick: bool, correction: f64, innovations: [f64; N]) -> [(f64, f64); N] {
+        after_in(Response::Unknown, moved, is_quick, correction, innovations)
+    }
+
+    /// The same for a spring of which this is known.
+    fn after_in<const N: usize>(
+        mut response: Response,
+        moved: f64,
+        is_quick: bool,
+        correction: f64,
+        innovations: [f64; N],
+    ) -> [(f64, f64); N] {
         let config = Config::new(1e-3, Signal::from_num(NOISE), is_quick);
         let (mut state, mut recent) = (State::default(), Envelope::default());
         let (model, correction) = (Signal::from_num(moved), Signal::from_num(correction));
         envelope::Config::new(1e-3).track(&mut recent, model);
         innovations.map(|nu| {
-            let Influence { clipped, quick } = config.of(&mut state, Signal::from_num(nu), correction, model, &recent);
+            let Influence { clipped, quick, .. } =
+                config.of((&mut state, &mut response), Signal::from_num(nu), correction, model, &recent);
             (clipped.to_num::<f64>().round(), quick.to_num())
         })
     }
@@ -175,7 +211,10 @@ mod tests {
         for (moved, is_quick) in [(NOISE, false), (NOISE + step, true)] {
             // Without the tick in which the envelope already returns.
             let (mut state, model, recent) = (State::default(), Signal::from_num(moved), Envelope::default());
-            let mut of = || config.of(&mut state, Signal::from_num(20), Signal::ZERO, model, &recent).quick;
+            let mut of = || {
+                let state = (&mut state, &mut Response::Unknown);
+                config.of(state, Signal::from_num(20), Signal::ZERO, model, &recent).quick
+            };
             of();
             assert_eq!(of() > Signal::ZERO, is_quick, "{moved} V");
         }
@@ -190,7 +229,8 @@ mod tests {
         let mut found = 0;
         for bits in 0..4000 {
             let mut state = State::default();
-            let mut of = |nu: Signal| config.of(&mut state, nu, Signal::ZERO, model, &recent).clipped;
+            let mut of =
+                |nu: Signal| config.of((&mut state, &mut Response::Unknown), nu, Signal::ZERO, model, &recent).clipped;
             of(Signal::from_bits(bits) - Signal::from_num(6.114));
             let clipped = of(Signal::from_num(50));
             let behind = state.innovations.distances(Signal::ZERO).0;
@@ -209,5 +249,23 @@ mod tests {
         assert_eq!(of(true, -4.0, [-20.0, 8.0, 8.0]), [(-6.0, 0.0), (8.0, 0.0), (8.0, 3.0)]);
         assert_eq!(of(true, -40.0, [-20.0, 60.0, 60.0]), [(-6.0, 0.0), (46.0, 0.0), (46.0, 30.0)]);
         assert_eq!(of(false, -40.0, [-20.0, 60.0, 60.0]), [(-6.0, 0.0), (6.0, 0.0), (6.0, 0.0)]);
+    }
+
+    /// The model has moved by 100 V within one reading.
+    #[test]
+    fn a_spring_that_answered_without_delay_is_corrected_more_quickly_both_ways() {
+        fn prompt<const N: usize>(correction: f64, innovations: [f64; N]) -> [(f64, f64); N] {
+            after_in(Response::Rest, 100.0, true, correction, innovations)
+        }
+        // A sixteenth of at most 6 V; behind, the rest is clipped as ever.
+        assert_eq!(prompt(0.0, [-4.0, -4.0, 2.0, -80.0]), [(-4.0, -0.25), (-4.0, -0.25), (2.0, 0.125), (-6.0, -0.375)]);
+        // Behind, then ahead: an oscillation.
+        assert_eq!(prompt(0.0, [-40.0, 8.0, 8.0]), [(-6.0, -0.375), (6.0, 0.0), (6.0, 0.0)]);
+        // Two of 2 V are less than 3 V; they take a correction back as they do for any spring.
+        assert_eq!(prompt(0.0, [2.0, 2.0]).map(|(_, quick)| quick), [0.125, 0.125 + 0.75 * 0.875]);
+        assert_eq!(prompt(-40.0, [2.0, 2.0]).map(|(_, quick)| quick), [0.125, 0.125 + 1.5]);
+        // Late, or at rest.
+        assert_eq!(prompt(0.0, [-60.0, -60.0]).map(|(_, quick)| quick), [0.0; 2]);
+        assert_eq!(after_in(Response::Rest, 5.0, true, 0.0, [-4.0, -4.0]).map(|(_, quick)| quick), [0.0; 2]);
     }
 }

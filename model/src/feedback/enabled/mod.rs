@@ -1,19 +1,21 @@
 //! The correction with its settings and state, built with the feature `feedback`.
 //!
-//! Readings come in through [`fault_detection`], which rejects what cannot be true; [`influence`] clips what remains,
-//! and [`oscillation`] reduces the gain if the loop oscillates. What goes out is the corrected target and the corrected
-//! estimate.
+//! Readings come in through [`fault_detection`], which rejects what cannot be true; [`influence`] clips what remains, and corrects a
+//! spring whose [`response`] shows no delay more quickly, and [`oscillation`] reduces the gain if the loop oscillates. What goes out is the
+//! corrected target and the corrected estimate.
 
 mod envelope;
 pub mod fault_detection;
 mod influence;
 pub mod oscillation;
+mod response;
 mod settings;
 
 pub use fault_detection::{Fault, Sensor};
 pub use settings::{Feedback, HISTORY, Reading};
 
-use self::influence::Influence;
+use self::influence::{Influence, PROMPT_SHIFT};
+use self::response::Response;
 use super::Observed;
 use crate::coefficient::{Rate, upper, widened};
 use crate::units::{Accumulator, ScaledStiffness, Signal, Volts};
@@ -36,6 +38,7 @@ pub struct State {
     /// Ring buffer of the model's stiffness at the last ticks.
     model: [Signal; HISTORY],
     newest: u8,
+    response: Response,
     influence: influence::State,
     detection: fault_detection::State,
     oscillation: oscillation::State,
@@ -74,15 +77,19 @@ impl Config {
                 self.oscillation.detect(&mut state.oscillation, mismatch, self.detection.noise());
                 let (innovation, model) = (mismatch.saturating_sub(correction), state.model_at(0));
                 let recent = state.detection.model_envelope();
-                let Influence { clipped, quick } =
-                    self.influence.of(&mut state.influence, innovation, correction, model, recent);
+                let Influence { clipped, quick, observed } = self.influence.of(
+                    (&mut state.influence, &mut state.response),
+                    innovation,
+                    correction,
+                    model,
+                    recent,
+                );
                 let step = self.gain.step(clipped).saturating_add(widened(quick));
-                let observed = if quick == Signal::ZERO { Observed::Reading } else { Observed::Ahead };
                 (state.oscillation.reduce(step), observed)
             }
             (Sensor::Trusted, None) => (Accumulator::ZERO, Observed::Nothing),
             _ => {
-                state.influence.forget();
+                state.forget();
                 (self.fade.step(Signal::ZERO.saturating_sub(correction)), Observed::Untrusted)
             }
         };
@@ -90,14 +97,16 @@ impl Config {
         (state.corrected(target), observed)
     }
 
-    /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, without delay at one that shows the
-    /// spring ahead, both reduced after an oscillation, and back to 0 V while the sensor is not trusted.
+    /// Lets `seen` follow a signal as the correction follows the mismatch: by the gain at a reading, more quickly where the spring is prompt,
+    /// without delay at a reading that shows it ahead, all reduced after an oscillation, and back to 0 V while the sensor is not trusted.
     #[inline]
     #[cfg_attr(not(feature = "robust"), allow(dead_code, reason = "only the robust pre-compensator needs it"))]
     pub(crate) fn follow(&self, state: &State, observed: Observed, seen: &mut Accumulator, signal: Signal) {
         let distance = |to: Signal| to.saturating_sub(upper(*seen));
+        let by_gain = || self.gain.step(distance(signal));
         let step = match observed {
-            Observed::Reading => state.oscillation.reduce(self.gain.step(distance(signal))),
+            Observed::Reading => state.oscillation.reduce(by_gain()),
+            Observed::Prompt => state.oscillation.reduce(by_gain() + (widened(distance(signal)) >> PROMPT_SHIFT)),
             // As much of it as the correction has taken of the innovation.
             Observed::Ahead => state.oscillation.reduce(widened(distance(signal)) - (widened(distance(signal)) >> 2)),
             Observed::Nothing => Accumulator::ZERO,
@@ -123,11 +132,18 @@ impl State {
     /// Prepares the state for another configuration; `None` is one without a sensor.
     pub(crate) fn transfer_to(&mut self, config: Option<&Config>) {
         if config.is_some() {
-            self.influence.forget();
+            self.forget();
             self.oscillation = oscillation::State::default();
         } else {
             *self = Self::default();
         }
+    }
+
+    /// Forgets what the last readings have shown: they say nothing about the ones to come, and a movement that has begun is not rated.
+    #[inline]
+    fn forget(&mut self) {
+        self.influence.forget();
+        self.response = Response::Unknown;
     }
 
     /// Shifts the correction by a jump of the model that the spring has not made, and what the readings are compared with.
@@ -183,13 +199,14 @@ mod tests {
         let seen = |observed| seen_in(&State::default(), observed);
         assert_eq!((seen(Observed::Nothing), seen(Observed::Ahead)), (20.0, 80.0));
         assert!((seen(Observed::Reading) - (20.0 + 80.0 * feedback.gain())).abs() < 1e-3);
+        assert!((seen(Observed::Prompt) - (20.0 + 80.0 * (feedback.gain() + 1.0 / 16.0))).abs() < 1e-3);
         assert!((19.0..20.0).contains(&seen(Observed::Untrusted)));
         let reduced = State { oscillation: oscillation::State::reduced(1), ..State::default() };
         assert_eq!(seen_in(&reduced, Observed::Ahead), 20.0 + 60.0 / 4.0);
         assert!((seen_in(&reduced, Observed::Reading) - (20.0 + 80.0 / 4.0 * feedback.gain())).abs() < 1e-3);
     }
 
-    /// What the sensor has corrected stays, unless the next configuration has no sensor.
+    /// What the sensor has corrected stays, unless the next configuration has no sensor; a movement that has begun is not rated.
     #[test]
     fn after_a_transfer_the_gain_is_not_reduced() {
         let running = State {
@@ -202,7 +219,8 @@ mod tests {
             state.transfer_to(config);
             state
         };
-        assert_eq!(after(Some(&quick())), State { oscillation: oscillation::State::default(), ..running });
+        let response = Response::Unknown;
+        assert_eq!(after(Some(&quick())), State { response, oscillation: oscillation::State::default(), ..running });
         assert_eq!(after(None), State::default());
     }
 
