@@ -177,6 +177,12 @@ impl<S> State<S> {
     pub(crate) fn with_law_of(self, other: &Self) -> Self {
         Self { law: other.law, ..self }
     }
+
+    /// Returns what the present step has of its fall back.
+    #[cfg(feature = "feedback")]
+    pub(crate) fn phase(&self) -> Phase {
+        self.phase
+    }
 }
 
 #[cfg(test)]

@@ -154,7 +154,7 @@ pub(super) struct Thresholds {
 
 /// What a step has of its fall back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Phase {
+pub(crate) enum Phase {
     /// It has none.
     #[default]
     Never,

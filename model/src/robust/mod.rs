@@ -55,6 +55,8 @@ pub(crate) use enabled::Robust;
 pub use enabled::State;
 #[cfg(feature = "robust")]
 pub use fall_back::FallBack;
+#[cfg(all(test, feature = "feedback", feature = "robust"))]
+pub(crate) use fall_back::Phase;
 #[cfg(feature = "robust")]
 pub use margin::Margin;
 
