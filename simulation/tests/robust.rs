@@ -278,17 +278,35 @@ fn the_fixed_point_tick_agrees_with_double_precision() {
     }
 }
 
-/// The springs fall back and return in the same ticks but for one: there the stiffness differs by the depth of the fall back.
+/// The springs fall back and return in the same ticks but for one: there the stiffness differs by the depth of the fall back. Each extension
+/// of the spring alone, and all of them.
 #[test]
 fn the_fixed_point_tick_falls_back_with_double_precision() {
-    let file = PlantFile::from(Settings::PAPER.plant);
+    let lags = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = [5.0, 7.0]\nweights = [0.6, 0.3]\n";
+    let varying = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\ntau_high_s = 6.0\n";
+    let memory = "[memory]\ndirect = 0.95\nthresholds_v = [30.0]\nweights = [0.1]\n";
+    let law = "[law]\nvoltage_v = [0.0, 300.0, 1000.0]\nstiffness = [0.0, 270.0, 950.0]\n";
+    let leakage = "[leakage]\nshare = 0.05\ntau_s = 60.0\n";
+    let one = "schema = 1\n[relaxation]\nshare = 0.1\ntau_s = 5.5\n";
+    let extended = [
+        lags.to_owned(),
+        varying.to_owned(),
+        [one, memory].concat(),
+        [one, law].concat(),
+        [one, leakage].concat(),
+        [lags, memory, law, leakage].concat(),
+    ];
+    let extended = extended.iter().map(|text| parse("extended", text).unwrap());
     let margin = Margin { share: 0.0, fall_back: 0.25, ..Margin::TYPICAL };
-    let (samples, without) = (on_stair(&file, margin), on_stair(&file, Margin { fall_back: 0.0, ..margin }));
-    let apart = |pair: (&Sample, &Sample)| pair.0.code != pair.1.code;
-    assert!(samples.iter().zip(&without).filter(|pair| apart(*pair)).count() > 10_000, "the voltage is another one");
-    let off = samples.iter().filter(|sample| (sample.stiffness.to_f64() - sample.reference).abs() > 0.05).count();
-    // Each of the five steps has two of these ticks.
-    assert!(off <= 10, "{off} ticks");
+    for file in [PlantFile::from(Settings::PAPER.plant)].into_iter().chain(extended) {
+        let (samples, without) = (on_stair(&file, margin), on_stair(&file, Margin { fall_back: 0.0, ..margin }));
+        let apart = |pair: (&Sample, &Sample)| pair.0.code != pair.1.code;
+        let apart = samples.iter().zip(&without).filter(|pair| apart(*pair)).count();
+        let off = samples.iter().filter(|sample| (sample.stiffness.to_f64() - sample.reference).abs() > 0.05).count();
+        assert!(apart > 10_000, "the voltage is another one in {apart} ticks only: {file:?}");
+        // Each of the five steps has two of these ticks.
+        assert!(off <= 10, "{off} ticks: {file:?}");
+    }
 }
 
 /// The robust controller on the ideal stair with a converter of 16 bits.
