@@ -4,6 +4,7 @@
 //! `instantiationToken`) is a digest of its description, so that the library can tell whether it is the one that the description
 //! was written for.
 
+use crate::ffi::{Status, WARNING};
 use crate::parts::{escaped, listed, structure, types, units};
 use crate::unit::{Kind, Unit};
 use crate::variables::variables;
@@ -12,7 +13,14 @@ use crate::version::Version;
 /// End of the experiment that an importer proposes, in s.
 const STOP_S: f64 = 10.0;
 /// Category of the messages about errors, which both standards name so.
-pub(crate) const ERRORS: &str = "logStatusError";
+const ERRORS: &str = "logStatusError";
+/// Category of the remarks, which both standards name so.
+const WARNINGS: &str = "logStatusWarning";
+
+/// The category of a message with this status.
+pub(crate) const fn category(status: Status) -> &'static str {
+    if status == WARNING { WARNINGS } else { ERRORS }
+}
 
 impl Kind {
     /// Name of the unit's library in the archive, without its ending.
@@ -65,7 +73,9 @@ impl Unit {
         let parts = [
             units(&variables),
             types(&variables, version),
-            format!("  <LogCategories>\n    <Category name=\"{ERRORS}\"/>\n  </LogCategories>\n"),
+            format!(
+                "  <LogCategories>\n    <Category name=\"{WARNINGS}\"/>\n    <Category name=\"{ERRORS}\"/>\n  </LogCategories>\n"
+            ),
             format!("  <DefaultExperiment startTime=\"0\" stopTime=\"{STOP_S}\" stepSize=\"{tick}\"/>\n"),
             listed(&variables, version),
             structure(&variables, version),
@@ -92,6 +102,7 @@ fn fnv_1a(bytes: &[u8]) -> u128 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ffi::ERROR;
     use simulation::control_loop::Options;
     use simulation::plant_file;
 
@@ -113,6 +124,16 @@ mod tests {
         all.dedup();
         assert_eq!(all.len(), 8);
         assert!(unit.description(Version::Three).contains(&unit.token(Version::Three)));
+    }
+
+    #[test]
+    fn every_category_of_a_message_is_described() {
+        let plant = plant_file::load("paper").expect("the report's spring");
+        let unit = Unit { kind: Kind::Both, plant, options: Options::PAPER };
+        for (version, status) in Version::ALL.into_iter().flat_map(|version| [(version, WARNING), (version, ERROR)]) {
+            let expected = format!("<Category name=\"{}\"/>", category(status));
+            assert!(unit.description(version).contains(&expected), "{expected}");
+        }
     }
 
     /// Test vectors published by the authors of FNV.

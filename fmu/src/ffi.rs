@@ -17,6 +17,7 @@ use crate::version::Version;
 /// A status of a call, with the numbers of both standards.
 pub(crate) type Status = c_int;
 pub(crate) const OK: Status = 0;
+pub(crate) const WARNING: Status = 1;
 pub(crate) const DISCARD: Status = 2;
 pub(crate) const ERROR: Status = 3;
 pub(crate) const FATAL: Status = 4;
@@ -47,11 +48,11 @@ pub(crate) fn instantiate(version: Version, token: *const c_char, resources: Res
     match catch_unwind(AssertUnwindSafe(make)) {
         Ok(Ok(unit)) => Box::into_raw(Box::new(Instance::new(unit, log))).cast(),
         Ok(Err(error)) => {
-            log(&format!("{error:#}"));
+            log(ERROR, &format!("{error:#}"));
             std::ptr::null_mut()
         }
         Err(panic) => {
-            log(&panic_text(&*panic));
+            log(ERROR, &panic_text(&*panic));
             std::ptr::null_mut()
         }
     }
@@ -74,7 +75,7 @@ pub(crate) fn call(instance: *mut c_void, work: impl FnOnce(&mut Instance) -> Re
         Ok(Err(error)) => (format!("{error:#}"), ERROR),
         Err(panic) => (panic_text(&*panic), FATAL),
     };
-    instance.log(&message);
+    instance.log(ERROR, &message);
     status
 }
 

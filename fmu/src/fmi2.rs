@@ -5,10 +5,10 @@ use std::ffi::{c_char, c_int, c_void};
 
 use simulation::bad_input;
 
-use crate::description::ERRORS;
+use crate::description::category;
 use crate::ffi::{
-    DISCARD, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set,
-    text, unsupported,
+    DISCARD, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
+    unsupported,
 };
 use crate::instance::Log;
 use crate::uri::path;
@@ -38,14 +38,14 @@ struct Callbacks {
 fn log(callbacks: *const Callbacks, name: *const c_char) -> Log {
     let name = c_text(text(name).unwrap_or_default());
     // SAFETY: the importer passes its functions, or null.
-    let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return Box::new(|_| {}) };
+    let Some(callbacks) = (unsafe { callbacks.as_ref() }) else { return Box::new(|_, _| {}) };
     let (logger, environment) = (callbacks.logger, callbacks.environment);
-    Box::new(move |message| {
+    Box::new(move |status, message| {
         // The message is a format of `printf`.
-        let (message, category) = (c_text(&message.replace('%', "%%")), c_text(ERRORS));
+        let (message, category) = (c_text(&message.replace('%', "%%")), c_text(category(status)));
         if let Some(logger) = logger {
             // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
-            unsafe { logger(environment, name.as_ptr(), ERROR, category.as_ptr(), message.as_ptr()) }
+            unsafe { logger(environment, name.as_ptr(), status, category.as_ptr(), message.as_ptr()) }
         }
     })
 }

@@ -5,7 +5,7 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use crate::description::ERRORS;
+use crate::description::category;
 use crate::ffi::{
     self, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
 };
@@ -18,11 +18,11 @@ type IntermediateUpdate = extern "C" fn(*mut c_void, f64, bool, bool, bool, bool
 
 /// The importer's logger as a function of a message.
 fn log(logger: Option<Logger>, environment: *mut c_void) -> Log {
-    Box::new(move |message| {
-        let (message, category) = (c_text(message), c_text(ERRORS));
+    Box::new(move |status, message| {
+        let (message, category) = (c_text(message), c_text(category(status)));
         if let Some(logger) = logger {
             // SAFETY: the importer's logger stays as long as its instance; the texts live as long as the call.
-            unsafe { logger(environment, ERROR, category.as_ptr(), message.as_ptr()) }
+            unsafe { logger(environment, status, category.as_ptr(), message.as_ptr()) }
         }
     })
 }
@@ -60,7 +60,7 @@ exported! {
         environment: *mut c_void,
         logger: Option<Logger>,
     ) -> *mut c_void {
-        log(logger, environment)("instantiated for model exchange: expected co-simulation");
+        log(logger, environment)(ERROR, "instantiated for model exchange: expected co-simulation");
         std::ptr::null_mut()
     }
 
@@ -76,7 +76,7 @@ exported! {
         _lock: Option<extern "C" fn()>,
         _unlock: Option<extern "C" fn()>,
     ) -> *mut c_void {
-        log(logger, environment)("instantiated for scheduled execution: expected co-simulation");
+        log(logger, environment)(ERROR, "instantiated for scheduled execution: expected co-simulation");
         std::ptr::null_mut()
     }
 
@@ -219,4 +219,32 @@ unsupported! {
     fmi3EnterStepMode();
     fmi3GetOutputDerivatives(_value_references: *const u32, _n_value_references: usize, _orders: *const i32, _values: *mut f64, _n_values: usize);
     fmi3ActivateModelPartition(_clock_reference: u32, _activation_time: f64);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::ffi::WARNING;
+
+    static HEARD: Mutex<Vec<(Status, String, String)>> = Mutex::new(Vec::new());
+
+    extern "C" fn hear(_: *mut c_void, status: Status, category: *const c_char, message: *const c_char) {
+        let [category, message] = [category, message].map(|it| text(it).expect("a text").to_owned());
+        HEARD.lock().expect("nothing panics in it").push((status, category, message));
+    }
+
+    #[test]
+    fn a_message_has_the_category_of_its_status() {
+        let log = log(Some(hear), std::ptr::null_mut());
+        log(ERROR, "wrong");
+        log(WARNING, "100 % without effect");
+        let expected = [(ERROR, "logStatusError", "wrong"), (WARNING, "logStatusWarning", "100 % without effect")];
+        let heard = HEARD.lock().expect("nothing panics in it");
+        assert!(
+            heard.iter().map(|(status, category, text)| (*status, category.as_str(), text.as_str())).eq(expected),
+            "{heard:?}"
+        );
+    }
 }

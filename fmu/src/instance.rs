@@ -6,6 +6,7 @@ use anyhow::Result;
 use simulation::bad_input;
 use simulation::bad_input::number;
 
+use crate::ffi::{Status, WARNING};
 use crate::machine::Machine;
 use crate::unit::Unit;
 use crate::variable::{Form, Role, Variable};
@@ -19,8 +20,8 @@ const MOST_TOLERANCE: f64 = 0.25;
 /// Most ticks of one step.
 const MOST_TICKS: f64 = 1e10;
 
-/// Receives the message of an error.
-pub(crate) type Log = Box<dyn Fn(&str)>;
+/// Receives a message, and the status that it explains: an error, or a warning that is a remark.
+pub(crate) type Log = Box<dyn Fn(Status, &str)>;
 
 /// An instance of a unit.
 pub(crate) struct Instance {
@@ -66,8 +67,8 @@ impl Instance {
     }
 
     /// Hands a message to the importer.
-    pub(crate) fn log(&self, message: &str) {
-        (self.log)(message);
+    pub(crate) fn log(&self, status: Status, message: &str) {
+        (self.log)(status, message);
     }
 
     /// Sets the time at which the simulation begins, in s.
@@ -92,14 +93,18 @@ impl Instance {
         Ok(())
     }
 
-    /// Ends the initialization: the parameters are checked, spring and controller are at rest at 0 V.
+    /// Ends the initialization: the parameters are checked, spring and controller are at rest at 0 V. A parameter without effect is a
+    /// remark.
     pub(crate) fn exit_initialization(&mut self) -> Result<()> {
         let Phase::Initializing = self.state.phase else {
             bad_input!("the initialization ends {}: expected in the initialization", self.state.phase);
         };
-        let machine = Machine::new(&self.unit, &self.variables, &self.state.values)?;
+        let (machine, remark) = Machine::new(&self.unit, &self.variables, &self.state.values)?;
         machine.rest(&self.variables, &mut self.state.values);
         self.state.phase = Phase::Stepping { machine: Box::new(machine), ticks: 0 };
+        if let Some(remark) = remark {
+            self.log(WARNING, &remark);
+        }
         Ok(())
     }
 
@@ -222,9 +227,12 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
     use super::*;
     use crate::unit::Kind;
-    use simulation::control_loop::Options;
+    use simulation::control_loop::{Controller, Options};
     use simulation::plant_file;
 
     #[test]
@@ -237,6 +245,38 @@ mod tests {
         instance.enter_initialization().expect("an instance");
         instance.exit_initialization().expect("parameters in their ranges");
         assert_eq!(instance.get(reading, &[Form::Real]).expect("an output"), 12.5);
+    }
+
+    /// The unit alone would fall back; a parameter of the importer leaves it without effect.
+    #[test]
+    fn a_fall_back_that_has_no_effect_is_a_remark() {
+        for (kind, known_share, expected) in [
+            (Kind::Both, 0.05, true),
+            (Kind::Controller, 0.05, true),
+            (Kind::Both, 0.0, false),
+            (Kind::Spring, 0.05, false),
+        ] {
+            let margin = model::Margin { share: 0.0, fall_back: 0.125, ..model::Margin::TYPICAL };
+            let options = Options { controller: Controller::Robust, margin: Some(margin), ..Options::PAPER };
+            let plant = plant_file::load("paper").expect("it is built in");
+            let messages = Rc::new(RefCell::new(Vec::new()));
+            let log = Rc::clone(&messages);
+            let log = Box::new(move |status, message: &str| log.borrow_mut().push((status, message.to_owned())));
+            let mut instance = Instance::new(Unit { kind, plant, options }, log);
+            if let Some(share) = instance.variables.iter().position(|variable| variable.name == "known_share") {
+                instance.set(share as u32, &[Form::Real], known_share).expect("a parameter");
+            }
+            instance.enter_initialization().expect("an instance");
+            assert!(messages.borrow().is_empty(), "{messages:?}");
+            instance.exit_initialization().expect("parameters in their ranges");
+            let messages = messages.borrow();
+            let is_remark = |(status, text): &(Status, String)| {
+                *status == WARNING
+                    && text.starts_with("a fall back by 12.5 % has no effect within these errors: it helps where")
+            };
+            assert_eq!(messages.len(), usize::from(expected), "{kind:?} {known_share}: {messages:?}");
+            assert!(messages.iter().all(is_remark), "{messages:?}");
+        }
     }
 
     #[test]
@@ -277,7 +317,7 @@ mod tests {
         for (start_s, is_fine) in [(0.0, true), (1.7e9, true), (-1.7e9, true), (1e13, false)] {
             let options = Options { rate_hz: 1.0 / step_s, ..Options::PAPER };
             let plant = plant_file::load("paper").expect("it is built in");
-            let mut instance = Instance::new(Unit { kind: Kind::Spring, plant, options }, Box::new(|_| ()));
+            let mut instance = Instance::new(Unit { kind: Kind::Spring, plant, options }, Box::new(|_, _| ()));
             instance.begin_at(start_s).expect("an instance");
             instance.enter_initialization().expect("an instance");
             instance.exit_initialization().expect("parameters in their ranges");
@@ -290,6 +330,6 @@ mod tests {
     }
 
     fn instance(plant: plant_file::PlantFile) -> Instance {
-        Instance::new(Unit { kind: Kind::Spring, plant, options: Options::PAPER }, Box::new(|_| ()))
+        Instance::new(Unit { kind: Kind::Spring, plant, options: Options::PAPER }, Box::new(|_, _| ()))
     }
 }

@@ -5,6 +5,7 @@ use model::{Input, Output as Tick, ScaledStiffness, Volts};
 use simulation::bad_input;
 use simulation::bad_input::BadInput;
 use simulation::control_loop::{ControlLoop, Controller, SpringAlone};
+use simulation::has_reference::remark_on_fall_back;
 use simulation::plant_file::{PlantFile, Reading};
 
 use crate::unit::Unit;
@@ -33,11 +34,11 @@ impl Unit {
 }
 
 impl Machine {
-    /// The parts at rest at 0 V.
+    /// The parts at rest at 0 V, and what the user should know about the parameters.
     ///
     /// # Errors
     /// [`BadInput`] with the first parameter out of its range, and the range.
-    pub(crate) fn new(unit: &Unit, variables: &[Variable], values: &[f64]) -> Result<Self> {
+    pub(crate) fn new(unit: &Unit, variables: &[Variable], values: &[f64]) -> Result<(Self, Option<String>)> {
         let mut options = unit.options;
         let (mut model, mut spring) = (unit.plant.clone(), unit.plant.clone());
         for (variable, &value) in variables.iter().zip(values) {
@@ -58,13 +59,12 @@ impl Machine {
         if options.controller != Controller::Robust {
             options.margin = None;
         }
-        let control = match unit.kind.has_controller() {
-            false => None,
-            true => {
-                check("model", &model)?;
-                Some(ControlLoop::new(&model, &options)?)
-            }
-        };
+        let (mut control, mut remark) = (None, None);
+        if unit.kind.has_controller() {
+            check("model", &model)?;
+            control = Some(ControlLoop::new(&model, &options)?);
+            remark = options.margin.and_then(|margin| remark_on_fall_back(model.extended(), &margin));
+        }
         let alone = match unit.kind.has_spring() {
             false => None,
             true => {
@@ -73,7 +73,7 @@ impl Machine {
             }
         };
         let reading = spring.reading.unwrap_or_default();
-        Ok(Self { control, spring: alone, reading, rate_hz: options.rate_hz })
+        Ok((Self { control, spring: alone, reading, rate_hz: options.rate_hz }, remark))
     }
 
     /// Ticks per second, in Hz.
