@@ -164,8 +164,18 @@ fn robust(spring: &Spring, margin: &Margin) -> Robust {
 
 /// What the user should know about a fall back that is allowed and brings no spring within the errors of `margin` into the band earlier.
 pub fn remark_on_fall_back(plant: ExtendedPlant, margin: &Margin) -> Option<String> {
-    let inert = margin.fall_back > 0.0 && robust(&plant.into(), margin).fall_back.is_none();
-    inert.then(|| {
+    remark_if(margin, || robust(&plant.into(), margin).fall_back.is_none())
+}
+
+/// The same of a model that is not known: a remark only where the fall back has no effect with any. Of a model nothing but its largest
+/// feedthrough matters.
+pub fn remark_on_any_fall_back(margin: &Margin) -> Option<String> {
+    let mut feedthroughs = std::iter::successors(Some(1e-3), |last| Some(1.02 * last)).take_while(|it| *it < 1.0);
+    remark_if(margin, || feedthroughs.all(|feedthrough| FallBack::design(margin, feedthrough).is_none()))
+}
+
+fn remark_if(margin: &Margin, has_no_effect: impl FnOnce() -> bool) -> Option<String> {
+    (margin.fall_back > 0.0 && has_no_effect()).then(|| {
         format!(
             "a fall back by {} % has no effect within these errors: it helps where the time constant is known less well than share and gain",
             (1e4 * margin.fall_back).round() / 100.0
@@ -242,4 +252,27 @@ pub fn reference_at(system: Loop, schedule: &Schedule, times_s: impl IntoIterato
         solution.moment().stiffness
     };
     times_s.into_iter().map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant_file::PlantFile;
+
+    /// What has no effect with any model has none with each, and what has none with each of many has none with any.
+    #[test]
+    fn a_remark_on_any_model_is_one_on_each() {
+        let (mut on_any, mut on_none) = (0, 0);
+        for (tau, share, gain) in (0..6).flat_map(|a| (0..6).flat_map(move |b| (0..3).map(move |c| (a, b, c)))) {
+            let [time_constant, share, gain] =
+                [(tau, 0.02), (share, 0.02), (gain, 0.01)].map(|(n, by)| by * f64::from(n));
+            let margin = Margin { time_constant, share, gain, overshoot: 0.02, fall_back: 0.25 };
+            let of = |percent: i32| Plant { share: f64::from(percent) / 100.0, time_constant_s: 5.5 };
+            let each = (1..70).all(|it| remark_on_fall_back(PlantFile::from(of(it)).extended(), &margin).is_some());
+            assert_eq!(remark_on_any_fall_back(&margin).is_some(), each, "{margin:?}");
+            assert_eq!(remark_on_any_fall_back(&Margin { fall_back: 0.0, ..margin }), None);
+            *if each { &mut on_any } else { &mut on_none } += 1;
+        }
+        assert!(on_any > 30 && on_none > 30, "{on_any} {on_none}");
+    }
 }

@@ -5,7 +5,7 @@ use link::{Block, State};
 use serde_json::Value;
 
 use crate::mcu::{Mcu, Setup};
-use crate::vsj::{bad, good, json};
+use crate::vsj::{bad, good, json, run};
 
 /// A file of this text, for the command line.
 fn file(folder: &tempfile::TempDir, name: &str, text: &str) -> String {
@@ -148,6 +148,36 @@ fn the_robust_controller_runs_with_the_margin_of_a_file() {
     );
     let shown = good(port, &["settings", "--default"]);
     assert!(shown.starts_with("# runs    number 2, format 1, ") && shown.contains("controller = \"paper\""), "{shown}");
+}
+
+/// The remarks of `vsj stair`, also where the settings came first and the model, which does not come back, came later.
+#[test]
+fn a_fall_back_that_has_no_effect_with_the_model_is_a_remark() {
+    let mcu = Mcu::on_socket(Setup::default());
+    let folder = tempfile::tempdir().unwrap();
+    let remarks = |arguments: &[&str]| {
+        let output = run(&mcu.port, arguments);
+        assert!(output.status.success(), "{output:?}");
+        let said = String::from_utf8(output.stderr).unwrap();
+        let expected =
+            format!("vsj: {}: a fall back by 12.5 % has no effect within these errors: it helps where", mcu.port);
+        assert!(said.is_empty() || said.starts_with(&expected) && said.lines().count() == 1, "{said}");
+        !said.is_empty()
+    };
+    let robust = |margin: &str| {
+        let text = format!("schema = 1\ncontroller = \"robust\"\n[margin]\nfall_back = 0.125\n{margin}\n");
+        file(&folder, &format!("{margin}.toml").replace('\n', " "), &text)
+    };
+    let (as_well, exactly) = (robust("share = 0.05"), robust("share = 0.0"));
+    let for_a_small_share = robust("share = 0.0\ntime_constant = 0.02\ngain = 0.01");
+    assert!(remarks(&["settings", &for_a_small_share]), "with the model that is built in");
+    assert!(remarks(&["settings", &as_well]) && remarks(&["settings"]), "with the model that is built in");
+    assert!(!remarks(&["settings", &exactly]) && !remarks(&["settings"]));
+    let half = file(&folder, "half.toml", "schema = 1\n[relaxation]\nshare = 0.5\ntau_s = 5.5\n");
+    assert!(remarks(&["model", &half]) && !remarks(&["model", "paper"]), "with the model that was sent");
+    assert!(!remarks(&["settings"]) && !remarks(&["settings", &for_a_small_share]), "some models would have one");
+    assert!(remarks(&["settings", &as_well]), "with none");
+    assert!(!remarks(&["settings", "--default"]) && !remarks(&["model", &half]), "another controller");
 }
 
 /// The model that is stored decides which gains can run.

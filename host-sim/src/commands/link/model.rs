@@ -4,10 +4,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 use host_sim::link::Failure;
 use host_sim::output::terminal::{json, print, remark};
-use link::{Reason, WireModel};
+use link::{Controller, Reason, WireModel};
 use simulation::bad_input;
 
 use super::session::Session;
+use super::settings::remark_on_margin;
 use crate::commands::plant;
 
 /// A spring whose stiffness is below this, in V, counts as settled at 0 V.
@@ -32,12 +33,12 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, model: Option<&W
         None => session.client.models(),
         Some(model) => session.client.install(model),
     };
-    let name = session.client.name();
+    let name = session.client.name().to_owned();
     let models = match answer {
         Err(Failure::Refused(reason @ Reason::BadModel { .. })) => {
             bad_input!("{}: {reason}", arguments.plant.as_deref().unwrap_or_default())
         }
-        answer => answer.with_context(|| name.to_owned())?,
+        answer => answer.with_context(|| name.clone())?,
     };
     let estimate_v = session.status.sample.estimate.to_f64();
     if let Some(wait_s) = model.and_then(|model| unsettled_s(estimate_v, model)) {
@@ -45,6 +46,13 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, model: Option<&W
             "{name}: the estimated stiffness is still {estimate_v:.0} V, but the MCU has restarted and takes it to be at rest; \
              leave it disarmed for {wait_s:.0} s"
         ));
+    }
+    // The model is stored and runs: what follows is no failure.
+    if let Some(model) = model
+        && session.status.firmware.controller == Controller::Robust
+        && let Ok(settings) = session.client.read_settings(false)
+    {
+        remark_on_margin(&name, &settings, Some(model.plant()));
     }
     let text = format!("runs    {}\nstored  {}\n", models.active, models.stored);
     print(&if session.json { json(&models)? } else { text })

@@ -5,10 +5,13 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use host_sim::link::Failure;
-use host_sim::output::terminal::{json, print};
-use link::{Blocks, Reason};
+use host_sim::output::terminal::{json, print, remark};
+use link::{Blocks, Reason, WireSettings};
+use model::{ExtendedPlant, Margin, Plant};
 use serde::Serialize;
 use simulation::bad_input;
+use simulation::has_reference::{remark_on_any_fall_back, remark_on_fall_back};
+use simulation::plant_file::PlantFile;
 use simulation::settings_file::{SettingsFile, Source};
 
 use super::session::Session;
@@ -62,11 +65,32 @@ pub(super) fn run(session: &mut Session, arguments: &Arguments, source: Option<&
         }
         blocks => blocks.with_context(|| name.clone())?,
     };
-    let running = session.client.read_settings(false).with_context(|| name)?;
+    let running = session.client.read_settings(false).with_context(|| name.clone())?;
+    if margin(&running).is_some_and(|margin| margin.fall_back > 0.0) {
+        // Of a stored model the MCU says nothing but its identity.
+        let is_built_in = session.client.models().with_context(|| name.clone())?.active.number == 0;
+        let built_in = is_built_in.then(|| PlantFile::from(Plant::PAPER));
+        remark_on_margin(&name, &running, built_in.as_ref().map(PlantFile::extended));
+    }
     let settings = SettingsFile::from(&running);
     print(&if session.json {
         json(&Report { blocks, settings })?
     } else {
         format!("# runs    {}\n# stored  {}\n{}", blocks.active, blocks.stored, settings.to_toml()?)
     })
+}
+
+/// The margin of the robust controller, if it is the one that runs.
+fn margin(settings: &WireSettings) -> Option<Margin> {
+    settings.margin.and_then(Margin::from_values)
+}
+
+/// Remarks on a fall back that has no effect with the MCU's model, or with any if that is not known.
+pub(super) fn remark_on_margin(name: &str, settings: &WireSettings, plant: Option<ExtendedPlant>) {
+    let Some(margin) = margin(settings) else { return };
+    let text = match plant {
+        Some(plant) => remark_on_fall_back(plant, &margin),
+        None => remark_on_any_fall_back(&margin),
+    };
+    text.iter().for_each(|text| remark(&format!("{name}: {text}")));
 }
