@@ -86,6 +86,16 @@ impl Model {
         Self { blocks, relaxation: self.relaxation.clone() }
     }
 
+    /// Returns the model with an instantaneous share of 0 instead of a negative one; `None` if it has no negative one.
+    pub fn without_negative_share(&self) -> Option<Self> {
+        let mut changed = self.clone();
+        let negative = |(block, point): &&mut (Block, Vec<f64>)| {
+            block.cause() == "instantaneous-share" && block.form == 0 && point.iter().any(|share| *share < 0.0)
+        };
+        changed.blocks.iter_mut().find(negative)?.1.fill(0.0);
+        Some(changed)
+    }
+
     /// Returns true if an effect is in the model, in any form.
     pub fn has(&self, effect: usize) -> bool {
         self.blocks.iter().any(|(block, _)| block.effect == effect)

@@ -9,6 +9,7 @@ use crate::plant::initial_state::InitialState;
 use crate::record::data::Data;
 use crate::record::scales::Scales;
 use crate::record::signal::Signal;
+use crate::stats::thresholds::probability::NATS_WITHIN_INTERVAL;
 use simulation::open_loop;
 use simulation::plant_file::{PlantFile, Reading};
 use simulation::record::{Record, Row};
@@ -38,8 +39,13 @@ pub struct Export {
 }
 
 /// Exports a fitted model, under which the reading may have a zero and a gain relative to the nominal ones; `held` says that the record's
-/// voltage is held between rows.
-pub(crate) fn export(engine: &Engine, model: &Model, reading_map: Option<[f64; 2]>, held: bool) -> Export {
+/// voltage is held between rows. A negative share whose 95 % interval contains 0 is 0 in the file, since no tick runs a negative one.
+pub(crate) fn export(engine: &mut Engine, model: &Model, reading_map: Option<[f64; 2]>, held: bool) -> Export {
+    let log_likelihood = |engine: &mut Engine, model: &Model| engine.evaluate(model.clone()).log_likelihood;
+    let whole = model
+        .without_negative_share()
+        .filter(|whole| log_likelihood(engine, whole) > log_likelihood(engine, model) - NATS_WITHIN_INTERVAL);
+    let model = whole.as_ref().unwrap_or(model);
     let (data, base) = (engine.data, engine.base());
     let mut file = restored(engine, &model.extend(base, data));
     if let Some([zero_v, gain]) = reading_map {
