@@ -4,23 +4,14 @@
 //! `instantiationToken`) is a digest of its description, so that the library can tell whether it is the one that the description
 //! was written for.
 
-use crate::ffi::{Status, WARNING};
 use crate::parts::{escaped, listed, structure, types, units};
+use crate::status::{ERRORS, WARNINGS};
 use crate::unit::{Kind, Unit};
 use crate::variables::variables;
 use crate::version::Version;
 
 /// End of the experiment that an importer proposes, in s.
 const STOP_S: f64 = 10.0;
-/// Category of the messages about errors, which both standards name so.
-const ERRORS: &str = "logStatusError";
-/// Category of the remarks, which both standards name so.
-const WARNINGS: &str = "logStatusWarning";
-
-/// The category of a message with this status.
-pub(crate) const fn category(status: Status) -> &'static str {
-    if status == WARNING { WARNINGS } else { ERRORS }
-}
 
 impl Kind {
     /// Name of the unit's library in the archive, without its ending.
@@ -102,7 +93,7 @@ fn fnv_1a(bytes: &[u8]) -> u128 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ffi::ERROR;
+    use crate::status::{ERROR, WARNING, category};
     use simulation::control_loop::Options;
     use simulation::plant_file;
 

@@ -1,7 +1,7 @@
 //! Pointers of the C interface, which an importer promises to be valid, as references and slices; and errors as its status.
 
 use std::any::Any;
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::slice;
@@ -10,17 +10,10 @@ use anyhow::{Context, Result};
 use simulation::bad_input;
 
 use crate::instance::{Instance, Log, State};
+use crate::status::{ERROR, FATAL, OK, Status};
 use crate::unit::Unit;
 use crate::variable::Form;
 use crate::version::Version;
-
-/// A status of a call, with the numbers of both standards.
-pub(crate) type Status = c_int;
-pub(crate) const OK: Status = 0;
-pub(crate) const WARNING: Status = 1;
-pub(crate) const DISCARD: Status = 2;
-pub(crate) const ERROR: Status = 3;
-pub(crate) const FATAL: Status = 4;
 
 /// A function that an importer finds by its name.
 macro_rules! exported {

@@ -5,12 +5,11 @@ use std::ffi::{c_char, c_int, c_void};
 
 use simulation::bad_input;
 
-use crate::description::category;
 use crate::ffi::{
-    DISCARD, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
-    unsupported,
+    c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text, unsupported,
 };
 use crate::instance::Log;
+use crate::status::{DISCARD, OK, Status, category};
 use crate::uri::path;
 use crate::variable::Form;
 use crate::version::Version;

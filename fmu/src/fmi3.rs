@@ -5,11 +5,9 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use crate::description::category;
-use crate::ffi::{
-    self, ERROR, OK, Status, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text,
-};
+use crate::ffi::{self, c_text, call, exported, free, free_state, get, instantiate, put, restore, save, set, text};
 use crate::instance::Log;
+use crate::status::{ERROR, OK, Status, category};
 use crate::variable::Form;
 use crate::version::Version;
 
@@ -226,7 +224,7 @@ mod tests {
     use std::sync::Mutex;
 
     use super::*;
-    use crate::ffi::WARNING;
+    use crate::status::WARNING;
 
     static HEARD: Mutex<Vec<(Status, String, String)>> = Mutex::new(Vec::new());
 

@@ -6,8 +6,8 @@ use anyhow::Result;
 use simulation::bad_input;
 use simulation::bad_input::number;
 
-use crate::ffi::{Status, WARNING};
 use crate::machine::Machine;
+use crate::status::{Status, WARNING};
 use crate::unit::Unit;
 use crate::variable::{Form, Role, Variable};
 use crate::variables::variables;

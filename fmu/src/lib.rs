@@ -11,6 +11,7 @@
 //! | [`description`], `parts` | `modelDescription.xml` for both versions |
 //! | `machine` | values of the variables in, ticks, values out |
 //! | `instance` | one instance: what may be called when, time, messages, saved states |
+//! | `status` | the status of a call, and the category of its message |
 //! | `ffi` | pointers of the C interface |
 //! | `fmi2`, `fmi3` | the functions that an importer calls |
 //! | `uri` | folders as URIs |
@@ -24,6 +25,7 @@ mod fmi3;
 mod instance;
 mod machine;
 mod parts;
+mod status;
 pub mod unit;
 mod uri;
 pub mod variable;

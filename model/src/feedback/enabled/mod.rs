@@ -106,7 +106,10 @@ impl Config {
         let by_gain = || self.gain.step(distance(signal));
         let step = match observed {
             Observed::Reading => state.oscillation.reduce(by_gain()),
-            Observed::Prompt => state.oscillation.reduce(by_gain() + (widened(distance(signal)) >> PROMPT_SHIFT)),
+            Observed::Prompt => {
+                let without_delay = widened(distance(signal)) >> PROMPT_SHIFT;
+                state.oscillation.reduce(by_gain().saturating_add(without_delay))
+            }
             // As much of it as the correction has taken of the innovation.
             Observed::Ahead => state.oscillation.reduce(widened(distance(signal)) - (widened(distance(signal)) >> 2)),
             Observed::Nothing => Accumulator::ZERO,

@@ -7,7 +7,6 @@
 //! - *prompt*: when the model had moved by `12 noise_v`, the spring had not been behind by more than half of that.
 //! - A movement is quick if the model covers the second half of these `12 noise_v` within [`READINGS`] readings: in a slow one every spring
 //!   keeps up with its model.
-//!
 //! - A prompt spring that is more than `4.5 noise_v` behind and more than that ahead within 0.5 s oscillates: it is not prompt any more.
 //!
 //! The spring is rated once for each movement, until the model has come back to within `6 noise_v` of its recent range.
