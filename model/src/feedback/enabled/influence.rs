@@ -102,9 +102,9 @@ impl Config {
         let up = innovation >= Signal::ZERO;
         let mirrored = |signal: Signal| if up { signal } else { signal.saturating_neg() };
         let (moved, behind) = if up { (risen, was_negative) } else { (fallen, was_positive) };
+        let ahead = if behind > self.noise { Signal::ZERO } else { moved };
         let size = mirrored(innovation);
         if !self.is_quick {
-            let ahead = if behind > self.noise { Signal::ZERO } else { moved };
             let clipped = mirrored(size.min(self.noise.saturating_add(ahead)));
             return Influence { clipped, quick: Signal::ZERO, observed: Observed::Reading };
         }
@@ -112,7 +112,6 @@ impl Config {
             if risen > fallen { (risen, was_negative, was_positive) } else { (fallen, was_positive, was_negative) };
         *response = response.after(far, late, early, self.noise);
         let is_prompt = *response == Response::Prompt;
-        let ahead = if behind > self.noise { Signal::ZERO } else { moved };
         let back = mirrored(correction).saturating_neg().max(Signal::ZERO);
         let bound = self.noise.saturating_add(ahead).saturating_add(back);
         let bounded = mirrored(size.min(self.noise >> 1));
