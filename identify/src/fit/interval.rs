@@ -92,7 +92,8 @@ pub fn parameters(engine: &mut Engine, fit: &Fit, effect: usize) -> Vec<(String,
                     variance = reading.variance(value);
                     slope.iter_mut().enumerate().for_each(|(of, slope)| *slope = reading.slope(of, value, *slope));
                     value = reading.at(value);
-                    reach = (reading.at(reach.0), reading.at(reach.1));
+                    // Gain and zero are free: no bound of a curve's coordinates limits its readings.
+                    reach = (f64::NEG_INFINITY, f64::INFINITY);
                 }
                 let error = covariance.as_ref().map_or(f64::INFINITY, |matrix| {
                     let slope = nalgebra::DVector::from_vec(slope);

@@ -93,7 +93,8 @@ pub(super) fn plant_file(
         memory: None,
         law: (law == InputLaw::Square).then(|| square(voltage.full_scale_v)),
         leakage: None,
-        relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: None },
+        // Curves over the voltage refer to what the spring has seen, whatever the unit.
+        relaxation: Relaxation { share, tau_s, weights, tau_high_s: None, tau_high_at_v: Some(voltage.full_scale_v) },
         amplifier: (delay_s > 0.0).then(|| Amplifier { delay_s: Some(delay_s), ..Amplifier::default() }),
         range: Some(voltage.range),
         modes,
