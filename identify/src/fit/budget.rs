@@ -6,7 +6,7 @@
 //! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 //!
-//! A search of normal effort whose work ends while it finds causes goes on, once, with nine times as much.
+//! A search of normal effort whose work becomes scarce while it finds causes goes on, once, with nine times as much.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -217,11 +217,11 @@ impl Budget {
         }
     }
 
-    /// Lets the present search, if its work has ended it, go on with more, once; true if it does.
+    /// Lets the present search, if scarce work has kept it from following all extensions, go on with more, once; true if it does.
     pub fn go_on(&self) -> bool {
         self.note_cut();
-        let is_cut = self.present_cut.load(Ordering::Relaxed) && !self.is_stopped();
-        if !is_cut || !self.may_go_on.swap(false, Ordering::Relaxed) {
+        let lacked_work = self.present_cut.load(Ordering::Relaxed) || self.is_scarce();
+        if !lacked_work || self.is_stopped() || !self.may_go_on.swap(false, Ordering::Relaxed) {
             return false;
         }
         let further = (FURTHER * self.granted() as f64) as u64;
@@ -304,6 +304,22 @@ mod tests {
         assert!(budget.is_over() && !budget.go_on());
         budget.close();
         assert!(budget.was_cut() && budget.work_left() == own, "the rest is for the report");
+    }
+
+    /// It has followed the most promising extensions only, also with the work that is kept for rare forms.
+    #[test]
+    fn a_search_whose_work_was_scarce_goes_on_before_it_has_ended() {
+        let budget = granted(Effort::Normal);
+        budget.spend(budget.granted() / 2 - 1);
+        assert!(!budget.go_on());
+        budget.spend(1);
+        assert!(!budget.is_over() && budget.go_on() && !budget.is_scarce());
+        let budget = granted(Effort::Normal);
+        budget.reserve();
+        budget.spend(budget.granted() / 4);
+        budget.release();
+        budget.spend(budget.work_left());
+        assert!(budget.go_on());
     }
 
     #[test]
