@@ -42,9 +42,12 @@ fn square(full_scale_v: f64) -> Law {
 }
 
 /// The instantaneous share; one below 0 or above 1, which a controller cannot use, is replaced by that limit where its interval contains
-/// it.
+/// it. Relative to a gain that may be 0 every share has a wide interval, whatever the response is.
 fn whole_share(nominal: &Nominal) -> f64 {
     let Quantity { value, low, high, .. } = nominal.share;
+    if (nominal.gain.low..=nominal.gain.high).contains(&0.0) {
+        return value;
+    }
     let limits = [(value < 0.0 && high >= 0.0, 0.0), (value > 1.0 && low <= 1.0, 1.0)];
     limits.into_iter().find_map(|(applies, limit)| applies.then_some(limit)).unwrap_or(value)
 }

@@ -454,6 +454,25 @@ fn other_laws_of_one_sign_stay_linear() {
     }
 }
 
+/// A washout, whose response vanishes: relative to a gain of 0 every share has an interval that contains 0 and 1. The noise is 0.2.
+#[test]
+fn plant_file_simulates_a_response_that_does_not_settle_at_the_voltage() {
+    let (mut lag, noise) = (0.0, normals(600));
+    let row = |row: usize| {
+        let voltage_v = 10.0 * ((row / 25 * 7) % 11) as f64;
+        let measured = Some(voltage_v - lag + 0.2 * noise[row]);
+        lag = voltage_v + (lag - voltage_v) * f64::exp(-0.1);
+        Row { line: 0, time_s: 0.05 * row as f64, voltage_v, measured }
+    };
+    let record = Record { name: "washout".into(), rows: (0..600).map(row).collect() };
+    let Identified { report, plant, .. } = found(std::slice::from_ref(&record));
+    let Nominal { gain, share, .. } = &report.nominal;
+    assert!(gain.low < 0.0 && 0.0 < gain.high && share.low < 0.0 && 1.0 < share.high, "{:#?}", report.nominal);
+    let options = Options { base: Base::new(plant).unwrap(), ..Options::default() };
+    let diagnosis = diagnose(&record, &options).unwrap();
+    assert!(diagnosis.baseline.rmse < 0.22, "{:?}", diagnosis.baseline);
+}
+
 /// Springs whose first response goes the other way, or beyond the settled one. The noise is 0.02.
 #[test]
 fn plant_file_simulates_a_share_outside_of_0_to_1() {
