@@ -77,7 +77,7 @@ pub(crate) const EFFORT: Choices<identify::Effort> = &[
     ("quick", "A quarter of the normal effort", identify::Effort::Quick),
     (
         "normal",
-        "At most 2 s of CPU time for 2400 rows, 8 s for 10 000, 20 s for 100 000; up to ten times as much up to 5000 rows where causes halve the error and more may be found",
+        "At most 2 s of CPU time for 2400 rows, 8 s for 10 000, 20 s for 100 000, up to twice that on a slow machine; up to five times as much up to 5000 rows where causes halve the error and more may be found",
         identify::Effort::Normal,
     ),
     ("thorough", "Ten times the normal effort", identify::Effort::Thorough),

@@ -6,7 +6,7 @@
 //! budget = WORK (rows / 4000)^0.55 for more than 4000 rows, WORK for fewer; a quarter if quick, ten times if thorough
 //! ```
 //!
-//! A search of normal effort whose work becomes scarce while it finds causes goes on, once, with nine times as much.
+//! A search of normal effort whose work becomes scarce while it finds causes goes on, once, with four times as much.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,8 +20,8 @@ use crate::fit::stop::Stop;
 pub enum Effort {
     /// A quarter of the normal effort.
     Quick,
-    /// At most 2 s of CPU time for 2400 rows, 8 s for 10 000 and 20 s for 100 000; up to ten times as much for up to 5000 rows whose
-    /// search ends while it finds causes.
+    /// At most 2 s of CPU time for 2400 rows, 8 s for 10 000 and 20 s for 100 000, up to twice that on a slow machine; up to five times as
+    /// much for up to 5000 rows whose search lacks work while it finds causes.
     #[default]
     Normal,
     /// Ten times the normal effort.
@@ -74,7 +74,7 @@ const FOR_RARE_FORMS: f64 = 0.125;
 const EXTENSION: f64 = 1.15;
 
 /// Ratio of the work with which a search of normal effort goes on, to the work that was granted to it.
-const FURTHER: f64 = 9.0;
+const FURTHER: f64 = 4.0;
 
 /// Work that an effort allows for a record.
 fn work(effort: Effort, rows: usize) -> f64 {
@@ -298,9 +298,9 @@ mod tests {
         assert!(!budget.go_on(), "its work has not ended");
         budget.spend(own);
         assert!(budget.is_over() && budget.go_on() && !budget.is_over() && !budget.is_scarce());
-        assert_eq!((budget.work_left(), budget.total()), (9 * own, 11 * own));
-        budget.spend(9 * own);
-        assert_eq!((budget.spent(), budget.spent_of_own()), (10 * own, own));
+        assert_eq!((budget.work_left(), budget.total()), (4 * own, 6 * own));
+        budget.spend(4 * own);
+        assert_eq!((budget.spent(), budget.spent_of_own()), (5 * own, own));
         assert!(budget.is_over() && !budget.go_on());
         budget.close();
         assert!(budget.was_cut() && budget.work_left() == own, "the rest is for the report");
