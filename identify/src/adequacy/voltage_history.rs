@@ -1,17 +1,20 @@
-//! Columns that a general law of the spring could respond to: functions of the present and earlier voltages, and of time.
+//! Columns that a general law of the spring could respond to: functions of the present and earlier voltages, of the simulated
+//! response to them, and of time.
 //!
-//! With the voltage `u` relative to the full scale, its first-order lags `x_k` at multiples of the nominal time constant, and the
-//! relative time `s` from 0 to 1:
+//! With the voltage `u` relative to the full scale, its first-order lags `x_k` at multiples of the nominal time constant, the
+//! simulated response `y` relative to its largest magnitude, and the relative time `s` from 0 to 1:
 //!
 //! | group | columns |
 //! | --- | --- |
 //! | earlier voltages | `u`, `x_k`, and the lags of the voltage's absolute changes |
 //! | levels | powers and products of `u` and `x_k`; triangles over the range of `u` and of the nominal lag `x` |
+//! | levels of the response | powers of `y`; triangles over its range; powers and products of `y` and `v = y - lag(y)` |
 //! | direction | `play(u) - u` and `play(x) - x` at five widths; `|d|`, `d |d|`, `d^3` of the difference `d = u - x` |
 //! | ageing | `u` and `x` times `s`, `s^2` and `ln(1 + 9 s)`; the sensitivity of `x` to its time constant, times `s`, `s^2` and `s^3` |
 
 use crate::record::data::Data;
 use crate::record::signal::{Lag, Piece};
+use crate::stats::scale::largest_magnitude;
 
 /// Time constants of the lags, in nominal time constants.
 const LAGS: [f64; 7] = [1.0 / 16.0, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0];
@@ -32,8 +35,9 @@ pub(super) struct Column {
     pub(super) values: Vec<f64>,
 }
 
-/// Returns all columns of a record whose spring has the nominal time constant `tau_s`, in s; columns may be constant.
-pub(super) fn columns(data: &Data, tau_s: f64) -> Vec<Column> {
+/// Returns all columns of a record whose spring has the nominal time constant `tau_s`, in s, and answers with `response`, in V,
+/// one value for each row; columns may be constant.
+pub(super) fn columns(data: &Data, tau_s: f64, response: &[f64]) -> Vec<Column> {
     let scale = data.full_scale_v.max(f64::MIN_POSITIVE);
     let u: Vec<f64> = data.voltage_v.iter().map(|voltage| voltage / scale).collect();
     let start = if data.initial_state_unknown { u[0] } else { 0.0 };
@@ -63,14 +67,23 @@ pub(super) fn columns(data: &Data, tau_s: f64) -> Vec<Column> {
         add(levels, each(&|row| u[row] * lag[row]));
     }
     for signal in [&u, &x] {
-        let (low, high) =
-            signal.iter().fold((0.0f64, 0.0f64), |(low, high), value| (low.min(*value), high.max(*value)));
-        let width = ((high - low) / TRIANGLES as f64).max(f64::MIN_POSITIVE);
-        for corner in 0..=TRIANGLES {
-            let at = low + corner as f64 * width;
-            add(levels, each(&|row| (1.0 - ((signal[row] - at) / width).abs()).max(0.0)));
-        }
+        triangles(signal).into_iter().for_each(|triangle| add(levels, triangle));
     }
+    // The law of a spring of higher order may act between its lags, where no lag of the voltage is.
+    let response_levels = "in the dependence on the level of the response";
+    let largest = largest_magnitude(response).max(f64::MIN_POSITIVE);
+    let y: Vec<f64> = response.iter().map(|value| value / largest).collect();
+    let behind = lagged(data, &y, tau_s, y[0]);
+    let v = |row: usize| y[row] - behind[row];
+    triangles(&y).into_iter().for_each(|triangle| add(response_levels, triangle));
+    for power in 1..=3 {
+        add(response_levels, each(&|row| y[row].powi(power)));
+        add(response_levels, each(&|row| v(row).powi(power)));
+    }
+    add(response_levels, each(&|row| y[row] * v(row)));
+    add(response_levels, each(&|row| y[row].powi(2) * v(row)));
+    add(response_levels, each(&|row| y[row] * v(row).powi(2)));
+    add(response_levels, each(&|row| v(row).abs()));
     let direction = "in the direction and size of changes";
     for signal in [&u, &x] {
         PLAYS.iter().for_each(|&width| add(direction, play(signal, width)));
@@ -98,6 +111,14 @@ fn lagged(data: &Data, values: &[f64], tau_s: f64, start: f64) -> Vec<f64> {
     let rows = values.iter().zip(data.time_s.iter().zip(next_s));
     rows.map(|(&value, (time_s, next_s))| lag.pass(Piece { duration_s: next_s - time_s, from: value, to: value }).0)
         .collect()
+}
+
+/// Triangles of height 1 over the range of `signal` and 0, each as wide as two of its [`TRIANGLES`] intervals.
+fn triangles(signal: &[f64]) -> Vec<Vec<f64>> {
+    let (low, high) = signal.iter().fold((0.0f64, 0.0f64), |(low, high), value| (low.min(*value), high.max(*value)));
+    let width = ((high - low) / TRIANGLES as f64).max(f64::MIN_POSITIVE);
+    let around = |at: f64| signal.iter().map(|value| (1.0 - ((value - at) / width).abs()).max(0.0)).collect();
+    (0..=TRIANGLES).map(|corner| around(low + corner as f64 * width)).collect()
 }
 
 /// Output of a play operator of half width `width`, less its input.

@@ -8,6 +8,7 @@ use simulation::record::Record;
 use crate::nominal::identified::Course;
 use crate::record::changes::{changes, follow};
 use crate::stats::median::{median, robust_deviation};
+use crate::stats::scale::largest_magnitude;
 use crate::stats::thresholds::empirical::ROWS_AFTER_CHANGE;
 
 /// A reading is far off if it deviates from those around it by more than this number of scales of all such deviations.
@@ -74,7 +75,7 @@ pub(super) fn of_errors(course: &Course, delay: f64) -> Vec<usize> {
 /// Returns for each reading whether the voltage has just jumped: by far more than it usually changes from row to row.
 pub(super) fn after_changes(course: &Course, delay: f64) -> Vec<bool> {
     let (time, voltage) = (&course.time_s, &course.voltage_v);
-    let full_scale = voltage.iter().fold(0.0, |most: f64, volts| most.max(volts.abs()));
+    let full_scale = largest_magnitude(voltage);
     let mut usual: Vec<f64> = voltage.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let least = JUMP * median(&mut usual).unwrap_or(0.0);
     let mut after = vec![false; time.len()];

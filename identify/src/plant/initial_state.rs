@@ -12,7 +12,7 @@ use std::borrow::Cow;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::stats::scale::robust_scale;
+use crate::stats::scale::{largest_magnitude, robust_scale};
 use crate::stats::sums::dot;
 use crate::stats::thresholds::empirical::HUBER_THRESHOLD;
 
@@ -241,7 +241,7 @@ struct Ends {
 
 impl Ends {
     fn of(kernel: &[f64]) -> Self {
-        let most = kernel.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let most = largest_magnitude(kernel);
         let end =
             |rows: &[f64], least: f64| rows.iter().rposition(|value| value.abs() > least).map_or(0, |last| last + 1);
         let vanished = end(kernel, VANISHED * most);
@@ -259,6 +259,7 @@ mod tests {
     use crate::record::data::Data;
     use crate::record::input::Input;
     use crate::record::observed::Observed;
+    use crate::stats::scale::largest_magnitude;
     use simulation::record::{Record, Row};
 
     const ROWS: usize = 900;
@@ -301,7 +302,7 @@ mod tests {
             let observed = Observed::new(&data);
             let mut engine = Engine::new(&data, &observed, &base);
             let residual = engine.residual(&model);
-            let left = residual.iter().fold(0.0f64, |far, left| far.max(left.abs()));
+            let left = largest_magnitude(&residual);
             assert!(data.initial_state_unknown && left < 0.01, "{blocks:?}: {left} V");
         }
     }

@@ -15,6 +15,7 @@ use crate::record::normalisation::Normalisation;
 use crate::record::scales::Scales;
 use crate::record::signal::Signal;
 use crate::stats::median::median;
+use crate::stats::scale::largest_magnitude;
 
 /// Number of pieces of the command if only some rows of a long record are used.
 const THINNED_PIECES: usize = 8_000;
@@ -106,7 +107,7 @@ impl Data {
             1 => all,
             _ => all.into_iter().step_by(every).collect(),
         });
-        let full_scale_v = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let full_scale_v = largest_magnitude(&voltage_v);
         let largest_v = reading.iter().fold(full_scale_v, |most, reading| most.max(reading.abs()));
         let origin_v = if normalisation.identified { origin(&voltage_v) } else { 0.0 };
         let mut gaps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -270,7 +271,7 @@ const NEVER_NEAR_ZERO: f64 = 0.1;
 /// Returns the voltage with the smallest magnitude if all have the same sign and none is near 0 V, else 0, in V.
 fn origin(voltage_v: &[f64]) -> f64 {
     let nearest = voltage_v.iter().copied().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
-    let largest = voltage_v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let largest = largest_magnitude(voltage_v);
     let far = nearest.abs() > NEVER_NEAR_ZERO * largest && voltage_v.iter().all(|v| v * nearest > 0.0);
     if far && nearest.abs() < largest { nearest } else { 0.0 }
 }

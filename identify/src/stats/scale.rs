@@ -27,6 +27,11 @@ pub fn root_mean_square(residual: &[f64]) -> f64 {
     (dot(residual, residual) / residual.len().max(1) as f64).sqrt()
 }
 
+/// Returns the largest magnitude of the values, in their unit; 0 if there are none.
+pub(crate) fn largest_magnitude(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+}
+
 /// Returns the mean square of the values about their mean, in their unit squared.
 pub(crate) fn variance(values: &[f64]) -> f64 {
     root_mean_square(&centred(values)).powi(2)

@@ -169,8 +169,6 @@ thresholds! {
     FEWEST_BLOCKS = 200.0, "blocks";
     /// Largest difference between the two finest octaves of white noise.
     COLOUR_OF_WHITE = 4.0, "standard errors";
-    /// If earlier voltages predict more of an error that is not white, it is not noise: of 1/f noise they predict up to 0.2.
-    SHARE_OF_COLOURED_NOISE = 0.35, "of the error's mean square", set by "cargo campaign nulls";
     /// A voltage that changes less from one period to the next is periodic.
     REPEATED_VOLTAGE = 0.01, "of its variance";
     /// Fewest rows in each of the eight parts whose means are compared with the error's scale.
